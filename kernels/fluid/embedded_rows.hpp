@@ -1,0 +1,97 @@
+// Immersed nodes inside the flow solver: their rows in the momentum system, and the flux that compatibility demands
+// through the faces around each body.
+#pragma once
+
+#include "common/vec3.hpp"
+#include "fluid/embedded.hpp"
+#include "grid/grid_views.hpp"
+
+namespace corpuscle {
+
+/// out = u_row - sum of weight u[column], in the compact order of the momentum operator.
+inline void apply_embedded_rows(const IndexSpace& index, const EmbeddedBodies& b, const Components<double>& u,
+                                const Array<double>& out) {
+  const int owned = index.owned();
+  const StencilViews row = b.velocity;
+  Kokkos::parallel_for("corpuscle::immersed::rows", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
+    const int c = row.node(r);
+    int i, j, k;
+    index.unpack(c, i, j, k);
+    const int e = index.compact(i, j, k);
+    Vec3 sum = load(u, c);
+    for (int n = 0; n < row.columns(r); ++n) sum -= row.weight(r, n) * load(u, row.column(r, n));
+    for (int m = 0; m < 3; ++m) out(e + m * owned) = sum[m];
+  });
+}
+
+/// rhs of those rows: the surface's part.
+inline void embedded_rhs(const IndexSpace& index, const EmbeddedBodies& b, const Array<double>& rhs) {
+  const int owned = index.owned();
+  const StencilViews row = b.velocity;
+  const auto u_surface = b.u_surface;
+  Kokkos::parallel_for("corpuscle::immersed::rhs", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
+    int i, j, k;
+    index.unpack(row.node(r), i, j, k);
+    const int e = index.compact(i, j, k);
+    for (int m = 0; m < 3; ++m) rhs(e + m * owned) = row.surface_weight(r) * u_surface(r, m);
+  });
+}
+
+/// sums [body, 2] = flux into the fluid through the faces of each body, and their total area, over this rank's faces.
+inline void body_flux_sums(const GridViews& grid, const EmbeddedBodies& b, const Array<double> (&flux)[3],
+                           const Table<double>& sums) {
+  const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
+  const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
+  const FaceViews face = b.faces;
+  const auto start = face.start;
+  using Team = Kokkos::TeamPolicy<Exec>::member_type;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::flux_sums", Kokkos::TeamPolicy<Exec>(b.bodies, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const Team& team) {
+        const int body = team.league_rank();
+        double into = 0, total = 0;
+        Kokkos::parallel_reduce(
+            Kokkos::TeamThreadRange(team, start(body), start(body + 1)),
+            [&](int n, double& sum) {
+              const int d = face.direction(n), c = face.cell(n);
+              sum += face.sign(n) * (d == 0 ? f0 : (d == 1 ? f1 : f2))(c);
+            },
+            into);
+        Kokkos::parallel_reduce(
+            Kokkos::TeamThreadRange(team, start(body), start(body + 1)),
+            [&](int n, double& sum) {
+              const int d = face.direction(n), c = face.cell(n);
+              sum += norm(load(d == 0 ? area0 : (d == 1 ? area1 : area2), c));
+            },
+            total);
+        Kokkos::single(Kokkos::PerTeam(team), [&]() {
+          sums(body, 0) = into;
+          sums(body, 1) = total;
+        });
+      });
+}
+
+/// Spread what is missing from `growth` evenly over the area of each body's faces, so that the net flux into the fluid
+/// equals the body's growth. `sums` holds the totals over all ranks.
+inline void correct_body_flux(const GridViews& grid, const EmbeddedBodies& b, const Table<double>& sums,
+                              const Array<double> (&flux)[3]) {
+  const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
+  const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
+  const FaceViews face = b.faces;
+  const auto start = face.start;
+  const auto growth = b.growth;
+  using Team = Kokkos::TeamPolicy<Exec>::member_type;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::correct_flux", Kokkos::TeamPolicy<Exec>(b.bodies, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const Team& team) {
+        const int body = team.league_rank();
+        const double missing = (growth(body) - sums(body, 0)) / (sums(body, 1) > 0 ? sums(body, 1) : 1.0);
+        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, start(body), start(body + 1)), [&](int n) {
+          const int d = face.direction(n), c = face.cell(n);
+          (d == 0 ? f0 : (d == 1 ? f1 : f2))(c) +=
+              face.sign(n) * missing * norm(load(d == 0 ? area0 : (d == 1 ? area1 : area2), c));
+        });
+      });
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,131 @@
+// Reductions over the flow field.
+#pragma once
+
+#include "fluid/embedded.hpp"
+#include "fluid/momentum.hpp"
+
+namespace corpuscle {
+
+/// Reduce over owned cells: `body(i, j, k, value)`.
+template <class Body, class Reducer>
+void reduce_owned(const char* label, const IndexSpace& index, const Body& body, const Reducer& reducer) {
+  using Value = typename Reducer::value_type;
+  Kokkos::parallel_reduce(
+      label, Policy(0, index.owned()),
+      KOKKOS_LAMBDA(int e, Value& value) {
+        body(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]), value);
+      },
+      reducer);
+}
+
+/// Padded number of this rank's first fluid cell, -1 if it has none.
+inline int first_fluid_cell(const IndexSpace& index, const Array<NodeKind>& kind) {
+  int first = index.size();
+  reduce_owned("corpuscle::fluid::first_fluid_cell", index,
+               KOKKOS_LAMBDA(int i, int j, int k, int& least) {
+                 const int c = index.cell(i, j, k);
+                 if (kind(c) == NodeKind::fluid && c < least) least = c;
+               },
+               Kokkos::Min<int>(first));
+  return first < index.size() ? first : -1;
+}
+
+/// Largest velocity magnitude at fluid nodes; not a number if any is.
+inline double largest_speed(const IndexSpace& index, const Array<NodeKind>& kind, const Components<double>& u) {
+  double square = 0;
+  reduce_owned("corpuscle::fluid::largest_speed", index,
+               KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+                 const int c = index.cell(i, j, k);
+                 if (kind(c) != NodeKind::fluid) return;
+                 const double s = dot(load(u, c), load(u, c));
+                 if (!(s <= most)) most = s;
+               },
+               Kokkos::Max<double>(square));
+  return std::sqrt(square);
+}
+
+/// Sum of squares of a vector field over fluid nodes.
+inline double owned_square(const IndexSpace& index, const Array<NodeKind>& kind, const Components<double>& field) {
+  double sum = 0;
+  reduce_owned("corpuscle::fluid::sum_of_squares", index,
+               KOKKOS_LAMBDA(int i, int j, int k, double& total) {
+                 const int c = index.cell(i, j, k);
+                 if (kind(c) == NodeKind::fluid) total += dot(load(field, c), load(field, c));
+               },
+               Kokkos::Sum<double>(sum));
+  return sum;
+}
+
+/// Integral of u over the volume, um4/us; cells inside bodies count with the velocity stored there.
+inline void volume_integral(const GridViews& grid, const Array<NodeKind>& kind, const Components<double>& u,
+                            double (&result)[3]) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  for (int m = 0; m < 3; ++m) {
+    result[m] = 0;
+    reduce_owned("corpuscle::fluid::volume_integral", index,
+                 KOKKOS_LAMBDA(int i, int j, int k, double& total) {
+                   const int c = index.cell(i, j, k);
+                   if (kind(c) != NodeKind::none) total += volume(c) * u(c, m);
+                 },
+                 Kokkos::Sum<double>(result[m]));
+  }
+}
+
+/// u += change (compact) on owned cells.
+inline void add_vector(const IndexSpace& index, const Array<double>& change, const Components<double>& u) {
+  const int owned = index.owned();
+  for_owned("corpuscle::fluid::add_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    for (int m = 0; m < 3; ++m) u(index.cell(i, j, k), m) += change(index.compact(i, j, k) + m * owned);
+  });
+}
+
+/// result -= viscous forces on each fluid cell, nN.
+template <bool skewed>
+void subtract_viscous(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind, double mu,
+                      const Components<double>& u, const Components<double>& result) {
+  const IndexSpace index = grid.index;
+  for_owned("corpuscle::fluid::viscous_force", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    if (kind(c) != NodeKind::fluid) return;
+    for (int m = 0; m < 3; ++m)
+      for (int d = 0; d < 3; ++d)
+        result(c, m) -= mu * (viscous_face<skewed>(g, u, index, d, c + index.stride(d), m) -
+                              viscous_face<skewed>(g, u, index, d, c, m));
+  });
+}
+
+/// force [body, 3] = pressure and viscous force that the fluid puts on each body through the faces around it, nN: what
+/// leaves the fluid's momentum balance there. The pressure on a face is that of the fluid node, extended along the
+/// face's direction where the next node has one.
+template <bool skewed>
+void momentum_balance(const GridViews& grid, const ViscousCoefficients& g, const Array<unsigned char>& mask, double mu,
+                      const Components<double>& u, const Array<double>& p, const EmbeddedBodies& b,
+                      const Table<double>& force) {
+  const IndexSpace index = grid.index;
+  const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
+  const FaceViews face = b.faces;
+  const auto start = face.start;
+  using Team = Kokkos::TeamPolicy<Exec>::member_type;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::momentum_balance", Kokkos::TeamPolicy<Exec>(b.bodies, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const Team& team) {
+        const int body = team.league_rank();
+        for (int m = 0; m < 3; ++m) {
+          double total = 0;
+          Kokkos::parallel_reduce(
+              Kokkos::TeamThreadRange(team, start(body), start(body + 1)),
+              [&](int n, double& sum) {
+                const int d = face.direction(n), c = face.cell(n), stride = index.stride(d), sign = face.sign(n);
+                const int fluid = sign > 0 ? c : c - stride, beyond = fluid + sign * stride;
+                const double p_face = mask(beyond) ? p(fluid) + 0.5 * (p(fluid) - p(beyond)) : p(fluid);
+                const double s = (d == 0 ? area0 : (d == 1 ? area1 : area2))(c, m);
+                sum += sign * (mu * viscous_face<skewed>(g, u, index, d, c, m) - p_face * s);
+              },
+              total);
+          Kokkos::single(Kokkos::PerTeam(team), [&]() { force(body, m) = total; });
+        }
+      });
+}
+
+}  // namespace corpuscle

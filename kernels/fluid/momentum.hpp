@@ -1,0 +1,212 @@
+// The implicit part of the momentum equation, row-scaled by its diagonal: unknowns and residuals are velocities.
+#pragma once
+
+#include "common/vec3.hpp"
+#include "fluid/masked_gradient.hpp"
+#include "grid/grid_views.hpp"
+
+namespace corpuscle {
+
+/// Coefficients of the viscous face fluxes. `normal[d]` multiplies the difference across the face; `cross[d][e]`
+/// multiply the tangential differences and are allocated on skewed grids only.
+struct ViscousCoefficients {
+  Array<double> normal[3];
+  Array<double> cross[3][3];
+};
+
+template <bool skewed>
+void viscous_coefficients(const GridViews& grid, const ViscousCoefficients& g) {
+  const IndexSpace index = grid.index;
+  const auto x = grid.x;
+  for (int d = 0; d < 3; ++d) {
+    const auto area = grid.face_area[d];
+    const auto normal = g.normal[d];
+    const auto cross0 = g.cross[d][(d + 1) % 3], cross1 = g.cross[d][(d + 2) % 3];
+    // One halo layer more than owned cells need: the diagonal is also wanted in the first halo layer.
+    std::array<int, 3> lower, upper;
+    for (int e = 0; e < 3; ++e) lower[e] = -1, upper[e] = index.n[e] + 1;
+    upper[d] += 1;
+    const auto kind = grid.base_kind;
+    for_box("corpuscle::fluid::viscous_coefficients", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+      const int c = index.cell(i, j, k), low = c - index.stride(d);
+      if (kind(c) != NodeKind::fluid && kind(low) != NodeKind::fluid) {
+        normal(c) = 0;
+        return;
+      }
+      const Vec3 f = face_coefficients(x, load(area, c), index, d, c);
+      normal(c) = f[d];
+      if (skewed) {  // not constexpr, here and below: device lambdas must not capture first inside one
+        cross0(c) = f[(d + 1) % 3];
+        cross1(c) = f[(d + 2) % 3];
+      }
+    });
+  }
+}
+
+/// diagonal = mass V + mu (sum of the normal coefficients), on owned cells and one halo layer.
+/// @param mass  density times the leading coefficient of the time derivative, pg/um3/us
+inline void momentum_diagonal(const GridViews& grid, const ViscousCoefficients& g, double mass, double mu,
+                              const Array<double>& diagonal) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  const auto g0 = g.normal[0], g1 = g.normal[1], g2 = g.normal[2];
+  const int s0 = index.stride(0), s1 = index.stride(1), s2 = index.stride(2);
+  for_box("corpuscle::fluid::momentum_diagonal", {-1, -1, -1}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
+          KOKKOS_LAMBDA(int i, int j, int k) {
+            const int c = index.cell(i, j, k);
+            const double sum = g0(c) + g0(c + s0) + g1(c) + g1(c + s1) + g2(c) + g2(c + s2);
+            const double value = mass * volume(c) + mu * sum;
+            diagonal(c) = value > 0 ? value : 1;
+          });
+}
+
+/// Viscous flux of one velocity component through the face between c - stride(d) and c, over mu.
+template <bool skewed, class Velocity>
+KOKKOS_INLINE_FUNCTION double viscous_face(const ViscousCoefficients& g, const Velocity& u, const IndexSpace& index,
+                                           int d, int c, int m) {
+  const int low = c - index.stride(d);
+  double flux = g.normal[d](c) * (u(c, m) - u(low, m));
+  if constexpr (skewed) {
+    for (int n = 1; n < 3; ++n) {
+      const int e = (d + n) % 3, s = index.stride(e);
+      flux += g.cross[d][e](c) * 0.25 * (u(c + s, m) - u(c - s, m) + u(low + s, m) - u(low - s, m));
+    }
+  }
+  return flux;
+}
+
+/// Convective transport of component m through the face, with the volume flux F: central.
+template <class Velocity>
+KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, NodeKind low_kind, NodeKind kind, int low,
+                                              int c, int m) {
+  if (kind == NodeKind::boundary) return flux * u(c, m);
+  if (low_kind == NodeKind::boundary) return flux * u(low, m);
+  return 0.5 * flux * (u(c, m) + u(low, m));
+}
+
+/// out = D^-1 A u on owned cells, compact order with component m at offset m * owned.
+///  fluid:    mass V u - mu (viscous fluxes) [+ rho (convective fluxes with the given face fluxes)]
+///  others:   u (immersed rows are replaced afterwards, blanked ones stay)
+template <bool skewed, bool convective, class Velocity>
+void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
+                    const Array<double>& diagonal, double mass, double mu, double rho, const Array<double> (&flux)[3],
+                    const Velocity& u, const Array<double>& out) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  const int owned = index.owned();
+  const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
+  for_owned("corpuscle::fluid::momentum_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
+    if (kind(c) != NodeKind::fluid) {
+      for (int m = 0; m < 3; ++m) out(e + m * owned) = u(c, m);
+      return;
+    }
+    const double inertia = mass * volume(c), scale = 1 / diagonal(c);
+    for (int m = 0; m < 3; ++m) {
+      double sum = inertia * u(c, m);
+      for (int d = 0; d < 3; ++d) {
+        const int next = c + index.stride(d);
+        sum -= mu * (viscous_face<skewed>(g, u, index, d, next, m) - viscous_face<skewed>(g, u, index, d, c, m));
+        if (convective) {
+          const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
+          const int low = c - index.stride(d);
+          sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
+                        convective_face(u, f(c), kind(low), kind(c), low, c, m));
+        }
+      }
+      out(e + m * owned) = sum * scale;
+    }
+  });
+}
+
+/// The part of the right-hand side that does not change within a step, [cell, 3], nN:
+/// V (mass1 u_old + mass2 u_older + force).
+/// @param mass1, mass2  density times the coefficients of the backward difference (second: 2 / dt, -1 / (2 dt)), negated
+inline void momentum_history(const GridViews& grid, double mass1, double mass2, const Components<double>& u_old,
+                             const Components<double>& u_older, const Vec3& force, const Components<double>& history) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  for_owned("corpuscle::fluid::momentum_history", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    store(history, c, volume(c) * (mass1 * load(u_old, c) + mass2 * load(u_older, c) + force));
+  });
+}
+
+/// history += V f for a force density that varies in space, [cell, 3], kPa/um.
+inline void add_body_force(const GridViews& grid, const Components<double>& f, const Components<double>& history) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  for_owned("corpuscle::fluid::body_force", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    store(history, c, load(history, c) + volume(c) * load(f, c));
+  });
+}
+
+/// history -= rho (convective fluxes of u with the face fluxes).
+inline void subtract_convection(const GridViews& grid, const Array<NodeKind>& kind, double rho,
+                                const Array<double> (&flux)[3], const Components<double>& u,
+                                const Components<double>& history) {
+  const IndexSpace index = grid.index;
+  const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
+  for_owned("corpuscle::fluid::convection", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    if (kind(c) != NodeKind::fluid) return;
+    for (int m = 0; m < 3; ++m) {
+      double sum = 0;
+      for (int d = 0; d < 3; ++d) {
+        const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
+        const int next = c + index.stride(d), low = c - index.stride(d);
+        sum += convective_face(u, f(next), kind(c), kind(next), c, next, m) -
+               convective_face(u, f(c), kind(low), kind(c), low, c, m);
+      }
+      history(c, m) -= rho * sum;
+    }
+  });
+}
+
+/// rhs = D^-1 (history - V grad p) at fluid nodes, the blanked nodes' own velocity elsewhere (immersed rows follow).
+inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, const Array<double>& diagonal,
+                         const Components<double>& history, const Components<double>& grad_p,
+                         const Components<double>& u, const Array<double>& rhs) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  const int owned = index.owned();
+  for_owned("corpuscle::fluid::momentum_rhs", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
+    const bool fluid = kind(c) == NodeKind::fluid;
+    const double scale = 1 / diagonal(c);
+    for (int m = 0; m < 3; ++m)
+      rhs(e + m * owned) = fluid ? scale * (history(c, m) - volume(c) * grad_p(c, m)) : u(c, m);
+  });
+}
+
+/// Between the padded field and compact Krylov vectors.
+inline void compact_from_field(const IndexSpace& index, const Components<double>& field, const Array<double>& vector) {
+  const int owned = index.owned();
+  for_owned("corpuscle::fluid::to_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    for (int m = 0; m < 3; ++m) vector(index.compact(i, j, k) + m * owned) = field(index.cell(i, j, k), m);
+  });
+}
+
+inline void field_from_compact(const IndexSpace& index, const Array<double>& vector, const Components<double>& field) {
+  const int owned = index.owned();
+  for_owned("corpuscle::fluid::from_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    for (int m = 0; m < 3; ++m) field(index.cell(i, j, k), m) = vector(index.compact(i, j, k) + m * owned);
+  });
+}
+
+/// result = 2 a - b over whole fields, halos included.
+inline void extrapolate(const Components<double>& a, const Components<double>& b, const Components<double>& result) {
+  const int n = static_cast<int>(a.extent(0));
+  Kokkos::parallel_for("corpuscle::fluid::extrapolate", Policy(0, n), KOKKOS_LAMBDA(int c) {
+    for (int m = 0; m < 3; ++m) result(c, m) = 2 * a(c, m) - b(c, m);
+  });
+}
+
+inline void extrapolate(const Array<double>& a, const Array<double>& b, const Array<double>& result) {
+  const int n = static_cast<int>(a.extent(0));
+  Kokkos::parallel_for("corpuscle::fluid::extrapolate", Policy(0, n),
+                       KOKKOS_LAMBDA(int c) { result(c) = 2 * a(c) - b(c); });
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,80 @@
+// Copies between cell views and halo buffers.
+#pragma once
+
+#include "grid/index_space.hpp"
+
+#include <array>
+
+namespace corpuscle {
+
+/// A box of cells lower <= (i, j, k) < upper.
+struct CellBox {
+  std::array<int, 3> lower{}, upper{};
+  int size() const {
+    int n = 1;
+    for (int d = 0; d < 3; ++d) n *= upper[d] > lower[d] ? upper[d] - lower[d] : 0;
+    return n;
+  }
+};
+
+/// The values of one cell, to or from a buffer with `size` entries a component. (Functions of their own: a device
+/// lambda must not capture anything first inside an `if constexpr`.)
+template <class Field, class Buffer>
+KOKKOS_INLINE_FUNCTION void pack_cell(const Field& field, int c, const Buffer& buffer, int at, int size) {
+  if constexpr (Field::rank == 1) {
+    buffer(at) = field(c);
+  } else {
+    for (int m = 0; m < static_cast<int>(field.extent(1)); ++m) buffer(at + m * size) = field(c, m);
+  }
+}
+
+template <class Field, class Buffer>
+KOKKOS_INLINE_FUNCTION void unpack_cell(const Field& field, int c, const Buffer& buffer, int at, int size) {
+  if constexpr (Field::rank == 1) {
+    field(c) = buffer(at);
+  } else {
+    for (int m = 0; m < static_cast<int>(field.extent(1)); ++m) field(c, m) = buffer(at + m * size);
+  }
+}
+
+template <class Field>
+KOKKOS_INLINE_FUNCTION void copy_cell(const Field& field, int from, int to) {
+  if constexpr (Field::rank == 1) {
+    field(to) = field(from);
+  } else {
+    for (int m = 0; m < static_cast<int>(field.extent(1)); ++m) field(to, m) = field(from, m);
+  }
+}
+
+/// buffer[component * box.size() + position in box] = field(cell, component)
+template <class Field, class Buffer>
+void pack_box(const IndexSpace& index, const CellBox& box, const Field& field, const Buffer& buffer) {
+  const auto lower = box.lower, upper = box.upper;
+  const int nx = upper[0] - lower[0], ny = upper[1] - lower[1], size = box.size();
+  const int lx = lower[0], ly = lower[1], lz = lower[2];
+  for_box("corpuscle::halo::pack", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+    pack_cell(field, index.cell(i, j, k), buffer, (i - lx) + nx * ((j - ly) + ny * (k - lz)), size);
+  });
+}
+
+template <class Field, class Buffer>
+void unpack_box(const IndexSpace& index, const CellBox& box, const Buffer& buffer, const Field& field) {
+  const auto lower = box.lower, upper = box.upper;
+  const int nx = upper[0] - lower[0], ny = upper[1] - lower[1], size = box.size();
+  const int lx = lower[0], ly = lower[1], lz = lower[2];
+  for_box("corpuscle::halo::unpack", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+    unpack_cell(field, index.cell(i, j, k), buffer, (i - lx) + nx * ((j - ly) + ny * (k - lz)), size);
+  });
+}
+
+/// field over `target` = field over the box shifted by `shift` cells along direction `d`; the boxes do not overlap.
+template <class Field>
+void copy_shifted(const IndexSpace& index, const CellBox& target, int d, int shift, const Field& field) {
+  const int offset = shift * index.stride(d);
+  for_box("corpuscle::halo::periodic", target.lower, target.upper, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    copy_cell(field, c + offset, c);
+  });
+}
+
+}  // namespace corpuscle

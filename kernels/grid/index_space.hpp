@@ -1,0 +1,76 @@
+// Indexing of one rank's block of a structured grid.
+#pragma once
+
+#include "common/types.hpp"
+
+#include <array>
+
+namespace corpuscle {
+
+/// Owned cells are 0 <= i < n[0] and so on; `halo` layers around them belong to neighbours, periodic images or the
+/// boundary. Views over cells are one-dimensional with i fastest, so that a neighbour is one stride away.
+///
+/// Beyond a physical (not periodic) boundary the first layer is the boundary itself: its "cell centres" are the
+/// centres of the boundary faces (edges and corners alike), so a velocity stored there is the boundary's own. Layers
+/// two and three beyond a physical boundary are void: never read.
+struct IndexSpace {
+  static constexpr int halo = 3;
+
+  int n[3] = {0, 0, 0};        // owned cells
+  int first[3] = {0, 0, 0};    // global index of the first owned cell
+  int global[3] = {0, 0, 0};   // cells of the whole grid
+  bool periodic[3] = {false, false, false};
+
+  KOKKOS_INLINE_FUNCTION int padded(int d) const { return n[d] + 2 * halo; }
+  KOKKOS_INLINE_FUNCTION int size() const { return padded(0) * padded(1) * padded(2); }
+  KOKKOS_INLINE_FUNCTION int owned() const { return n[0] * n[1] * n[2]; }
+  KOKKOS_INLINE_FUNCTION int stride(int d) const {
+    return d == 0 ? 1 : (d == 1 ? padded(0) : padded(0) * padded(1));
+  }
+  /// Position in a cell view of local cell (i, j, k), each from -halo to n + halo - 1.
+  KOKKOS_INLINE_FUNCTION int cell(int i, int j, int k) const {
+    return (i + halo) + padded(0) * ((j + halo) + padded(1) * (k + halo));
+  }
+  KOKKOS_INLINE_FUNCTION void unpack(int c, int& i, int& j, int& k) const {
+    i = c % padded(0) - halo;
+    j = (c / padded(0)) % padded(1) - halo;
+    k = c / (padded(0) * padded(1)) - halo;
+  }
+  KOKKOS_INLINE_FUNCTION bool owns(int i, int j, int k) const {
+    return i >= 0 && i < n[0] && j >= 0 && j < n[1] && k >= 0 && k < n[2];
+  }
+  /// Compact number of owned cell (i, j, k), 0 to owned() - 1.
+  KOKKOS_INLINE_FUNCTION int compact(int i, int j, int k) const { return i + n[0] * (j + n[1] * k); }
+};
+
+/// What a node of the grid (a cell centre) is to the flow solver.
+enum class NodeKind : std::int8_t {
+  fluid = 0,     // momentum and continuity are solved here
+  immersed = 1,  // outside a body, next to its surface: velocity reconstructed
+  inside = 2,    // inside a body: blanked
+  boundary = 3,  // first layer beyond a physical boundary: velocity known there
+  none = 4       // void layers
+};
+
+/// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper.
+template <class Body>
+void for_box(const std::string& label, const std::array<int, 3>& lower, const std::array<int, 3>& upper,
+             const Body& body) {
+  if (upper[0] <= lower[0] || upper[1] <= lower[1] || upper[2] <= lower[2]) return;
+  using Range = Kokkos::MDRangePolicy<Exec, Kokkos::Rank<3, Kokkos::Iterate::Left, Kokkos::Iterate::Left>,
+                                      Kokkos::IndexType<int>>;
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
+#else
+  Kokkos::parallel_for(
+      label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {upper[0] - lower[0], 4, 1}), body);
+#endif
+}
+
+/// Run `body(i, j, k)` for every owned cell.
+template <class Body>
+void for_owned(const std::string& label, const IndexSpace& index, const Body& body) {
+  for_box(label, {0, 0, 0}, {index.n[0], index.n[1], index.n[2]}, body);
+}
+
+}  // namespace corpuscle

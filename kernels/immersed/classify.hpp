@@ -1,0 +1,224 @@
+// What each node is: fluid, immersed, inside. No step needs a neighbour's answer from another rank: every rank holds
+// all surfaces and classifies its halo itself.
+#pragma once
+
+#include "immersed/band.hpp"
+
+namespace corpuscle {
+
+/// While classifying: a node beyond the band, whose side its grid line will tell.
+constexpr NodeKind undecided = static_cast<NodeKind>(5);
+
+/// Kind and body of the nodes of `box` from the signed distance; undecided beyond the band.
+inline void classify_band(const GridViews& grid, const NodeBox& box, const SurfaceSet& s, const BandViews& band,
+                          const NodeViews& nodes) {
+  const IndexSpace index = grid.index;
+  const auto base = grid.base_kind;
+  const auto triangle_body = s.triangle_body;
+  const unsigned triangles = static_cast<unsigned>(s.triangles);
+  const BandViews b = band;
+  const NodeViews out = nodes;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::classify_band", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        out.kind(c) = base(c);
+        out.body(c) = -1;
+        if (base(c) != NodeKind::fluid) return;
+        if (b.key(c) == no_key) {
+          out.kind(c) = undecided;
+        } else if (b.distance(c) < 0) {
+          out.kind(c) = NodeKind::inside;
+          out.body(c) = triangle_body(key_item(b.key(c)) % triangles);
+        }
+      });
+}
+
+/// Give undecided nodes the side of the decided node next to them on their grid line along `direction`. Links with an
+/// undecided end cross no surface (mark_cut_links puts both ends of a crossing into the band), so this is exact; after
+/// all three directions every node is decided unless the whole box holds no band node.
+inline void fill_lines(const IndexSpace& index, const NodeBox& box, int direction, const NodeViews& nodes) {
+  const int d1 = (direction + 1) % 3, d2 = (direction + 2) % 3;
+  const int lines1 = box.extent(d1), lines2 = box.extent(d2), length = box.extent(direction);
+  const int stride = index.stride(direction);
+  const NodeViews out = nodes;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::fill_lines", Policy(0, length > 0 ? lines1 * lines2 : 0), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        i[direction] = box.lower[direction];
+        i[d1] = box.lower[d1] + e % lines1;
+        i[d2] = box.lower[d2] + e / lines1;
+        const int first = index.cell(i[0], i[1], i[2]);
+        for (int pass = 0; pass < 2; ++pass) {  // forwards, then backwards for what comes before the first decided
+          bool known = false;
+          NodeKind kind = NodeKind::fluid;
+          int body = -1;
+          for (int step = 0; step < length; ++step) {
+            const int c = first + stride * (pass == 0 ? step : length - 1 - step);
+            if (out.kind(c) == NodeKind::fluid || out.kind(c) == NodeKind::inside) {
+              known = true, kind = out.kind(c), body = out.body(c);
+            } else if (out.kind(c) == undecided) {
+              if (known) out.kind(c) = kind, out.body(c) = body;
+            } else {
+              known = false;
+            }
+          }
+        }
+      });
+}
+
+/// Every undecided node gets the given kind and body.
+inline void decide_rest(const IndexSpace& index, const NodeBox& box, NodeKind kind, int body, const NodeViews& nodes) {
+  const NodeViews out = nodes;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::decide_rest", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        if (out.kind(c) == undecided) out.kind(c) = kind, out.body(c) = body;
+      });
+}
+
+/// Winding number of triangles first to last, under all images, around p: 1 inside, 0 outside (van Oosterom & Strackee
+/// 1983).
+inline double winding_number(const SurfaceSet& surface, const Images& images, int first, int last, const Vec3& p) {
+  const SurfaceSet s = surface;
+  const int triangles = last - first;
+  double angle = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::winding_number", Policy(0, triangles * images.count),
+      KOKKOS_LAMBDA(int item, double& sum) {
+        const Corners k = corners(s, first + item % triangles, images.shift[item / triangles]);
+        const Vec3 a = k.a - p, b = k.b - p, c = k.c - p;
+        const double la = norm(a), lb = norm(b), lc = norm(c);
+        sum += 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+      },
+      angle);
+  return angle / (4 * M_PI);
+}
+
+/// Outside nodes with a cut link, or an inside neighbour, become immersed.
+inline void mark_immersed(const Lattice& lattice, const NodeBox& box, const SurfaceSet& s, const BandViews& band,
+                          const NodeViews& nodes) {
+  const auto triangle_body = s.triangle_body;
+  const unsigned triangles = static_cast<unsigned>(s.triangles);
+  const BandViews b = band;
+  const NodeViews out = nodes;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::mark_immersed", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = lattice.node(i[0], i[1], i[2]);
+        if (out.kind(c) != NodeKind::fluid) return;
+        bool crossed = b.cut(c) != 0;
+        for (int d = 0; d < 3; ++d) {
+          const int stride = lattice.index.stride(d);
+          if (i[d] > lattice.lower[d]) {
+            crossed = crossed || (b.cut(c - stride) & (1 << d)) || out.kind(c - stride) == NodeKind::inside;
+          }
+          if (i[d] < lattice.upper[d]) crossed = crossed || out.kind(c + stride) == NodeKind::inside;
+        }
+        if (!crossed || b.key(c) == no_key) return;
+        out.kind(c) = NodeKind::immersed;
+        out.body(c) = triangle_body(key_item(b.key(c)) % triangles);
+      });
+}
+
+/// Fluid nodes without a fluid neighbour become immersed; their foot is the best among their own and their neighbours'
+/// triangles. Two such nodes are never neighbours, so the order does not matter. @returns how many of them are owned.
+inline int absorb_isolated(const Lattice& lattice, const NodeBox& box, const SurfaceSet& surface, const Images& images,
+                           const PseudoNormals& normals, const BandViews& band, const NodeViews& nodes) {
+  const SurfaceSet s = surface;
+  const BandViews b = band;
+  const NodeViews out = nodes;
+  int isolated = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::absorb_isolated", Policy(0, box.size()),
+      KOKKOS_LAMBDA(int e, int& sum) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = lattice.node(i[0], i[1], i[2]);
+        if (out.kind(c) != NodeKind::fluid) return;
+        const Vec3 p = lattice.position(c);
+        Key best = b.key(c);
+        for (int side = 0; side < 6; ++side) {
+          const int d = side / 2, step = side % 2 == 0 ? -1 : 1;
+          if (i[d] + step < lattice.lower[d] || i[d] + step > lattice.upper[d]) return;  // unknown: leave it
+          const int n = c + step * lattice.index.stride(d);
+          if (out.kind(n) == NodeKind::fluid) return;
+          if (out.kind(n) != NodeKind::immersed && out.kind(n) != NodeKind::inside) continue;
+          if (b.key(n) == no_key) continue;
+          const unsigned item = key_item(b.key(n));
+          const int t = static_cast<int>(item % static_cast<unsigned>(s.triangles));
+          const Key offered =
+              offer(p, corners(s, t, images.shift[item / static_cast<unsigned>(s.triangles)]), static_cast<int>(item));
+          best = offered < best ? offered : best;
+        }
+        if (best == no_key) return;
+        Vec3 foot;
+        b.key(c) = best;
+        b.distance(c) = signed_foot(s, normals, images, p, key_item(best), foot);
+        store(b.foot, c, foot);
+        out.kind(c) = NodeKind::immersed;
+        out.body(c) = s.triangle_body(static_cast<int>(key_item(best) % static_cast<unsigned>(s.triangles)));
+        if (lattice.index.owns(i[0], i[1], i[2])) sum += 1;
+      },
+      isolated);
+  return isolated;
+}
+
+/// Slots of the array filled by count_nodes().
+enum NodeCount { count_band, count_immersed, count_inside, count_undecided, count_cut, count_uncovered, count_slots };
+
+/// Owned nodes of `box` (band nodes: halos too): totals into counts[0 .. count_slots), then per body immersed and
+/// inside. A node is uncovered when it was inside at the last classification and is fluid now.
+inline void count_nodes(const IndexSpace& index, const NodeBox& box, const BandViews& band, const NodeViews& nodes,
+                        const Array<NodeKind>& previous, const Array<int>& counts) {
+  const auto kind = nodes.kind;
+  const auto body = nodes.body;
+  const auto cut = band.cut;
+  const auto key = band.key;
+  Kokkos::deep_copy(Exec(), counts, 0);
+  Kokkos::parallel_for(
+      "corpuscle::immersed::count_nodes", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        if (key(c) != no_key) Kokkos::atomic_fetch_add(&counts(count_band), 1);
+        if (!index.owns(i[0], i[1], i[2])) return;
+        if (kind(c) == undecided) Kokkos::atomic_fetch_add(&counts(count_undecided), 1);
+        if (kind(c) == NodeKind::fluid && previous(c) == NodeKind::inside) {
+          Kokkos::atomic_fetch_add(&counts(count_uncovered), 1);
+        }
+        const int links = (cut(c) & 1) + ((cut(c) >> 1) & 1) + ((cut(c) >> 2) & 1);
+        if (links > 0) Kokkos::atomic_fetch_add(&counts(count_cut), links);
+        if (kind(c) == NodeKind::immersed) {
+          Kokkos::atomic_fetch_add(&counts(count_immersed), 1);
+          Kokkos::atomic_fetch_add(&counts(count_slots + 2 * body(c)), 1);
+        } else if (kind(c) == NodeKind::inside) {
+          Kokkos::atomic_fetch_add(&counts(count_inside), 1);
+          Kokkos::atomic_fetch_add(&counts(count_slots + 2 * body(c) + 1), 1);
+        }
+      });
+}
+
+/// Owned immersed nodes in ascending order; entries beyond the list's extent are dropped. @returns how many there are.
+inline int list_immersed(const IndexSpace& index, const NodeBox& box, const Array<NodeKind>& kind,
+                         const Array<int>& list) {
+  int total = 0;
+  Kokkos::parallel_scan(
+      "corpuscle::immersed::list_immersed", Policy(0, box.size()),
+      KOKKOS_LAMBDA(int e, int& position, bool final) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        if (!index.owns(i[0], i[1], i[2]) || kind(c) != NodeKind::immersed) return;
+        if (final && position < static_cast<int>(list.extent(0))) list(position) = c;
+        ++position;
+      },
+      total);
+  return total;
+}
+
+}  // namespace corpuscle

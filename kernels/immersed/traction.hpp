@@ -1,0 +1,346 @@
+// Fluid stress on the surfaces, from one-sided weighted least-squares fits around each vertex.
+#pragma once
+
+#include "immersed/own_side.hpp"
+#include "immersed/reconstruct.hpp"
+
+namespace corpuscle {
+
+/// Terms of the velocity fit, all anchored at the vertex: the gradient; with the square of the distance along the
+/// normal; with the square of the distance along the surface as well; all ten second-order terms less the constant.
+enum class TractionFit { gradient = 3, normal_square = 4, two_squares = 5, full_quadratic = 9 };
+
+struct TractionOptions {
+  TractionFit fit = TractionFit::full_quadratic;
+  bool immersed_nodes = true;     // let reconstructed velocities into the fit
+  bool immersed_pressure = true;  // and extended pressures into the pressure fit
+  bool ring = false;              // and the velocities of the vertex's neighbours on the surface
+  double radius = 2.5;            // in index-scaled distance; at most 2.5, so that three halo layers hold every point
+  double softening = 0.1;         // weights 1 / (r^2 + softening)
+};
+
+/// How a vertex got its traction; counted for velocity and pressure.
+enum TractionFallback {
+  traction_fitted,    // the fit asked for
+  traction_gradient,  // gradient only, from all points of the box
+  traction_normal,    // slope along the normal only
+  traction_nothing,   // no fluid on this side: no viscous part
+  pressure_fitted,
+  pressure_wide,     // linear fit from all points of the box, extended pressures included
+  pressure_average,  // mean of the points
+  pressure_nothing,  // no fluid on this side: no pressure
+  traction_counts
+};
+
+/// What the fits of one vertex need.
+struct TractionVertex {
+  int vertex;
+  SidePoint side;
+  double xi[3];
+  Vec3 row[3];     // gradients of the index coordinates
+  double spacing;  // along the normal, um
+};
+
+KOKKOS_INLINE_FUNCTION TractionVertex describe_vertex(const Lattice& lattice, const SurfaceSet& s, const Images& images,
+                                                      const PlaceViews& places, int v) {
+  TractionVertex t;
+  t.vertex = v;
+  const int m = places.image(v), item = m * s.vertices + v;
+  LatticePoint q;
+  for (int d = 0; d < 3; ++d) t.xi[d] = places.xi(item, d);
+  lattice.set(q, t.xi);
+  Vec3 tangent[3];
+  lattice.cell_tangents(q, tangent);
+  inverse_rows(tangent, t.row);
+  t.side.at = t.side.foot = load(s.x, v) + images.shift[m];
+  t.side.normal = load(s.normal, v);
+  t.side.body = s.vertex_body(v);
+  double fastest = 0;
+  for (int d = 0; d < 3; ++d) {
+    const double rate = std::fabs(dot(t.row[d], t.side.normal));
+    fastest = rate > fastest ? rate : fastest;
+  }
+  t.spacing = 1 / fastest;
+  return t;
+}
+
+/// Calls use(c, y, r, w) for every node that may inform vertex `t`: c its number, y its index-scaled and r its plain
+/// offset from the vertex, w the weight. `farthest` bounds |y|.
+template <class Use>
+KOKKOS_INLINE_FUNCTION void for_nodes_around(const StencilInput& in, const TractionVertex& t, double farthest,
+                                             double softening, const Use& use) {
+  int lower[3], upper[3];
+  for (int d = 0; d < 3; ++d) {
+    lower[d] = static_cast<int>(std::ceil(t.xi[d] - 2.5));
+    upper[d] = static_cast<int>(std::floor(t.xi[d] + 2.5));
+    lower[d] = lower[d] > in.lattice.lower[d] ? lower[d] : in.lattice.lower[d];
+    upper[d] = upper[d] < in.lattice.upper[d] ? upper[d] : in.lattice.upper[d];
+  }
+  for (int k = lower[2]; k <= upper[2]; ++k) {
+    for (int j = lower[1]; j <= upper[1]; ++j) {
+      for (int i = lower[0]; i <= upper[0]; ++i) {
+        const int c = in.lattice.node(i, j, k);
+        const NodeKind kind = in.nodes.kind(c);
+        if (kind == NodeKind::inside || kind == NodeKind::none) continue;
+        const Vec3 r = in.lattice.position(c) - t.side.at;
+        const Vec3 y{dot(t.row[0], r), dot(t.row[1], r), dot(t.row[2], r)};
+        const double r2 = dot(y, y);
+        if (r2 > farthest * farthest || !own_side(in.lattice, in.surface, in.band, t.side, c)) continue;
+        use(c, y, r, 1 / (r2 + softening));
+      }
+    }
+  }
+}
+
+/// Basis of the velocity fit: index-scaled offset, then the second-order terms.
+template <int N>
+KOKKOS_INLINE_FUNCTION void fit_basis(const TractionVertex& t, const Vec3& y, const Vec3& r, double (&phi)[N]) {
+  phi[0] = y.x, phi[1] = y.y, phi[2] = y.z;
+  const double eta = dot(r, t.side.normal) / t.spacing;
+  if constexpr (N == 4 || N == 5) phi[3] = eta * eta;
+  if constexpr (N == 5) {
+    const Vec3 along = r - (eta * t.spacing) * t.side.normal;
+    const Vec3 z{dot(t.row[0], along), dot(t.row[1], along), dot(t.row[2], along)};
+    phi[4] = dot(z, z);
+  }
+  if constexpr (N == 9) {
+    phi[3] = y.x * y.x, phi[4] = y.y * y.y, phi[5] = y.z * y.z;
+    phi[6] = y.x * y.y, phi[7] = y.y * y.z, phi[8] = y.z * y.x;
+  }
+}
+
+/// Gradient of each velocity component in index-scaled coordinates; false if the points do not carry the fit.
+template <int N>
+KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
+                                         const Vec3& v, const TractionOptions& options, double farthest,
+                                         Vec3 (&gradient)[3]) {
+  NormalMatrix<N> normal;
+  double right[3][N] = {};
+  int points = 0;
+  const auto add = [&](const Vec3& y, const Vec3& r, const Vec3& du, double w) {
+    double phi[N];
+    fit_basis(t, y, r, phi);
+    normal.add(phi, w);
+    for (int k = 0; k < N; ++k) {
+      for (int d = 0; d < 3; ++d) right[d][k] += w * phi[k] * du[d];
+    }
+    ++points;
+  };
+  for_nodes_around(in, t, farthest, options.softening, [&](int c, const Vec3& y, const Vec3& r, double w) {
+    if (in.nodes.kind(c) != NodeKind::immersed || options.immersed_nodes) add(y, r, load(u, c) - v, w);
+  });
+  if (points == 0) return false;
+  if (options.ring) {
+    const SurfaceSet& s = in.surface;
+    for (int e = s.ring_start(t.vertex); e < s.ring_start(t.vertex + 1); ++e) {
+      const int j = s.triangle(s.ring_triangle(e), (s.ring_corner(e) + 1) % 3);
+      const Vec3 r = load(s.x, j) - load(s.x, t.vertex);
+      const Vec3 y{dot(t.row[0], r), dot(t.row[1], r), dot(t.row[2], r)};
+      add(y, r, load(s.v, j) - v, 1 / (dot(y, y) + options.softening));
+    }
+  }
+  if (points < N + 2 || !normal.factorise(N == 9 ? 1e-3 : 5e-3)) return false;
+  for (int d = 0; d < 3; ++d) {
+    normal.solve(right[d]);
+    gradient[d] = {right[d][0], right[d][1], right[d][2]};
+  }
+  return true;
+}
+
+/// Slope along the normal only. @returns false without a point.
+KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
+                                      const Vec3& v, const TractionOptions& options, Vec3 (&gradient)[3]) {
+  double square = 0;
+  Vec3 sum;
+  for_nodes_around(in, t, 1e3, options.softening, [&](int c, const Vec3&, const Vec3& r, double w) {
+    if (in.nodes.kind(c) == NodeKind::immersed) return;
+    const double eta = dot(r, t.side.normal);
+    square += w * eta * eta;
+    sum += (w * eta) * (load(u, c) - v);
+  });
+  if (!(square > 0)) return false;
+  for (int d = 0; d < 3; ++d) gradient[d] = (sum[d] / square) * t.side.normal;
+  return true;
+}
+
+/// Gradient of the velocity in space, gradient[i][j] = du_i/dx_j, and how it was found.
+template <int N>
+KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Components<double>& u,
+                                             const TractionVertex& t, const Vec3& v, const TractionOptions& options,
+                                             Vec3 (&gradient)[3]) {
+  Vec3 scaled[3];
+  int how = traction_fitted;
+  if (!fit_gradient<N>(in, u, t, v, options, options.radius, scaled)) {
+    how = traction_gradient;
+    if (!fit_gradient<3>(in, u, t, v, options, 1e3, scaled)) {
+      return fit_slope(in, u, t, v, options, gradient) ? traction_normal : traction_nothing;
+    }
+  }
+  for (int d = 0; d < 3; ++d) gradient[d] = scaled[d].x * t.row[0] + scaled[d].y * t.row[1] + scaled[d].z * t.row[2];
+  return how;
+}
+
+/// Linear fit of the pressure at the vertex from points up to `farthest`; `mean` gets their weighted average.
+KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
+                                         double farthest, double softening, bool immersed, double& value,
+                                         double& mean) {
+  NormalMatrix<4> normal;
+  double right[4] = {0, 0, 0, 0};
+  int points = 0;
+  for_nodes_around(in, t, farthest, softening, [&](int c, const Vec3& y, const Vec3&, double w) {
+    const NodeKind kind = in.nodes.kind(c);
+    if (kind != NodeKind::fluid && !(immersed && kind == NodeKind::immersed)) return;
+    const double phi[4] = {1, y.x, y.y, y.z};
+    normal.add(phi, w);
+    for (int k = 0; k < 4; ++k) right[k] += w * phi[k] * p(c);
+    ++points;
+  });
+  mean = points > 0 ? right[0] / normal.a[0] : 0;
+  if (points < 6 || !normal.factorise(5e-3)) return false;
+  normal.solve(right);
+  value = right[0];
+  return true;
+}
+
+KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
+                                            const TractionOptions& options, double& value) {
+  double mean = 0;
+  const double softening = options.softening;
+  if (fit_pressure(in, p, t, options.radius, softening, options.immersed_pressure, value, mean)) return pressure_fitted;
+  // Where the surface runs along a grid plane, a single layer of fluid nodes may be in reach: the layer between it and
+  // the surface, to which the pressure was extended, carries the slope.
+  if (fit_pressure(in, p, t, 1e3, softening, true, value, mean)) return pressure_wide;
+  value = mean;
+  return mean != 0 ? pressure_average : pressure_nothing;
+}
+
+/// Fields and parameters of a traction.
+struct TractionInput {
+  Components<double> u;    // [cell, 3] um/us, reconstructed at immersed nodes, halos filled
+  Array<double> p;         // [cell] kPa, periodic part, extended to immersed nodes, halos filled
+  double viscosity = 0;    // mPa s
+  Vec3 pressure_gradient;  // kPa/um, imposed along periodic directions
+  Vec3 origin;             // where the imposed gradient's pressure is zero, um
+};
+
+/// Where tractions go; all [vertex, 3], kPa, zero at vertices of other ranks.
+struct TractionOutput {
+  Components<double> total, pressure, viscous;
+};
+
+template <int N>
+void vertex_tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
+                      const TractionOptions& options, const TractionOutput& out, const Array<int>& counts) {
+  const StencilInput in = input;
+  const PlaceViews where = places;
+  const TractionInput f = fields;
+  const TractionOutput to = out;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::vertex_tractions", Policy(0, in.surface.vertices), KOKKOS_LAMBDA(int v) {
+        Vec3 push, drag;
+        if (where.image(v) >= 0) {
+          const TractionVertex t = describe_vertex(in.lattice, in.surface, in.images, where, v);
+          const Vec3 n = t.side.normal;
+          Vec3 gradient[3];
+          const int how = velocity_gradient<N>(in, f.u, t, load(in.surface.v, v), options, gradient);
+          Kokkos::atomic_fetch_add(&counts(how), 1);
+          if (how != traction_nothing) {
+            const Vec3 transposed = n.x * gradient[0] + n.y * gradient[1] + n.z * gradient[2];
+            drag = f.viscosity * (Vec3{dot(gradient[0], n), dot(gradient[1], n), dot(gradient[2], n)} + transposed);
+          }
+          double p = 0;
+          Kokkos::atomic_fetch_add(&counts(surface_pressure(in, f.p, t, options, p)), 1);
+          p += dot(f.pressure_gradient, load(in.surface.x, v) - f.origin);
+          push = -p * n;
+        }
+        store(to.pressure, v, push);
+        store(to.viscous, v, drag);
+        store(to.total, v, push + drag);
+      });
+}
+
+/// Traction of the fluid on the owned vertices, t = -p n + mu (grad u + grad u^T) n; counts as TractionFallback.
+inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
+                      const TractionOptions& options, const TractionOutput& out, const Array<int>& counts) {
+  Kokkos::deep_copy(Exec(), counts, 0);
+  switch (options.fit) {
+    case TractionFit::gradient:
+      return vertex_tractions<3>(input, places, fields, options, out, counts);
+    case TractionFit::normal_square:
+      return vertex_tractions<4>(input, places, fields, options, out, counts);
+    case TractionFit::two_squares:
+      return vertex_tractions<5>(input, places, fields, options, out, counts);
+    case TractionFit::full_quadratic:
+      return vertex_tractions<9>(input, places, fields, options, out, counts);
+  }
+}
+
+/// Force (0 to 2) and torque about `centre` (3 to 5) of each body: [body, 6], nN and nN um. The vertices of a body are
+/// added up in a fixed order.
+inline void body_loads(const SurfaceSet& surface, const Components<double>& traction, const Components<double>& centre,
+                       const Components<double>& loads) {
+  using Team = Kokkos::TeamPolicy<Exec>;
+  const SurfaceSet s = surface;
+  const auto t = traction, about = centre, out = loads;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::body_loads", Team(s.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team::member_type& team) {
+        const int b = team.league_rank(), first = s.first_vertex(b), count = s.first_vertex(b + 1) - first;
+        for (int component = 0; component < 6; ++component) {
+          double total = 0;
+          Kokkos::parallel_reduce(
+              Kokkos::TeamThreadRange(team, count),
+              [&](int e, double& sum) {
+                const int v = first + e;
+                const Vec3 force = s.area(v) * load(t, v);
+                sum += component < 3 ? force[component] : cross(load(s.x, v) - load(about, b), force)[component - 3];
+              },
+              total);
+          Kokkos::single(Kokkos::PerTeam(team), [&]() { out(b, component) = total; });
+        }
+      });
+}
+
+struct Slip {
+  double largest = 0, square = 0;  // um/us; sum of squares
+};
+
+/// Difference between the surface's velocity and the fluid's, extrapolated to the owned vertices by a linear fit that
+/// is not anchored there. Vertices without enough points are left out.
+inline Slip surface_slip(const StencilInput& input, const PlaceViews& places, const Components<double>& u,
+                         const TractionOptions& options) {
+  const StencilInput in = input;
+  const PlaceViews where = places;
+  const auto field = u;
+  Slip slip;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::surface_slip", Policy(0, in.surface.vertices),
+      KOKKOS_LAMBDA(int v, double& square, double& largest) {
+        if (where.image(v) < 0) return;
+        const TractionVertex t = describe_vertex(in.lattice, in.surface, in.images, where, v);
+        NormalMatrix<5> normal;
+        double right[3][5] = {};
+        int points = 0;
+        for_nodes_around(in, t, options.radius, options.softening, [&](int c, const Vec3& y, const Vec3& r, double w) {
+          if (in.nodes.kind(c) == NodeKind::immersed) return;
+          const double eta = dot(r, t.side.normal) / t.spacing, phi[5] = {1, y.x, y.y, y.z, eta * eta};
+          normal.add(phi, w);
+          const Vec3 du = load(field, c) - load(in.surface.v, v);
+          for (int k = 0; k < 5; ++k) {
+            for (int d = 0; d < 3; ++d) right[d][k] += w * phi[k] * du[d];
+          }
+          ++points;
+        });
+        if (points < 8 || !normal.factorise(5e-3)) return;
+        Vec3 here;
+        for (int d = 0; d < 3; ++d) {
+          normal.solve(right[d]);
+          here[d] = right[d][0];
+        }
+        square += dot(here, here);
+        largest = norm(here) > largest ? norm(here) : largest;
+      },
+      slip.square, Kokkos::Max<double>(slip.largest));
+  return slip;
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,99 @@
+// Internal forces of all membranes at given positions: areas and volumes, forces of each triangle, sums at the
+// vertices.
+#pragma once
+
+#include "immersed/surface_geometry.hpp"
+#include "membrane/membrane_views.hpp"
+
+namespace corpuscle {
+
+/// Normals and areas of the triangles, and area and volume of each section, at positions x [vertex, 3].
+inline void measure_membranes(const MembraneViews& m, const Components<double>& x) {
+  const auto triangle = m.surface.triangle;
+  const auto first_triangle = m.surface.first_triangle, first_vertex = m.surface.first_vertex;
+  const auto geometry = m.triangle_geometry, totals = m.totals;
+  for_sections(
+      "corpuscle::membrane::measure", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const Vec3 origin = load(x, first_vertex(cell));
+        Sums<2> total;
+        Kokkos::parallel_reduce(
+            section_range(team, first_triangle(cell), first_triangle(cell + 1), section),
+            [&](int t, Sums<2>& sum) {
+              const Vec3 corner = load(x, triangle(t, 0));
+              const Vec3 a = area_vector(corner, load(x, triangle(t, 1)), load(x, triangle(t, 2)));
+              const double area = norm(a);
+              store(geometry, t, a * (1 / area));
+              geometry(t, 3) = area;
+              sum[0] += area;
+              sum[1] += dot(corner - origin, a) / 3;
+            },
+            total);
+        Kokkos::single(Kokkos::PerTeam(team), [&]() {
+          totals(cell * sections + section, 0) = total[0];
+          totals(cell * sections + section, 1) = total[1];
+        });
+      });
+}
+
+/// Forces of each triangle on its corners; measure_membranes must have run at the same x. Marks overstretched cells in
+/// m.status.
+inline void evaluate_triangles(const MembraneViews& m, const Components<double>& x) {
+  for_sections(
+      "corpuscle::membrane::triangle_forces", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const SurfaceSet& surface = m.surface;
+        const int type = m.type(cell), first = surface.first_triangle(cell);
+        const int shift = m.type_first_triangle(type) - first;
+        const CellLaw law = m.law(type);
+        const GlobalLoads loads = global_loads(section_total(m.totals, cell, 0), section_total(m.totals, cell, 1), law);
+        Kokkos::parallel_for(section_range(team, first, surface.first_triangle(cell + 1), section), [&](int t) {
+          TriangleState state;
+          for (int k = 0; k < 3; ++k) {
+            state.corner[k] = load(x, surface.triangle(t, k));
+            state.other_normal[k] = load(m.triangle_geometry, surface.neighbour(t, k));
+          }
+          state.normal = load(m.triangle_geometry, t);
+          state.area = m.triangle_geometry(t, 3);
+          Vec3 force[3];
+          const double stretch = triangle_forces(state, m.rest(t + shift), law, loads, force);
+          for (int k = 0; k < 3; ++k) {
+            for (int d = 0; d < 3; ++d) m.corner_force(t, 3 * k + d) = force[k][d];
+          }
+          if (!(stretch < SpringLaw::x_limit)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
+        });
+      });
+}
+
+/// Sum of the triangles' forces at vertex i, nN.
+KOKKOS_INLINE_FUNCTION Vec3 gather_force(const MembraneViews& m, int i) {
+  Vec3 force;
+  for (int r = m.surface.ring_start(i); r < m.surface.ring_start(i + 1); ++r) {
+    const int t = m.surface.ring_triangle(r), k = 3 * m.surface.ring_corner(r);
+    force += Vec3{m.corner_force(t, k), m.corner_force(t, k + 1), m.corner_force(t, k + 2)};
+  }
+  return force;
+}
+
+/// A third of the area vectors around vertex i: on a closed surface the gradient of its volume, um2. The sum of the
+/// areas themselves goes to `area`, um2.
+KOKKOS_INLINE_FUNCTION Vec3 gather_area(const MembraneViews& m, int i, double& area) {
+  Vec3 gradient;
+  area = 0;
+  for (int r = m.surface.ring_start(i); r < m.surface.ring_start(i + 1); ++r) {
+    const int t = m.surface.ring_triangle(r);
+    const double third = m.triangle_geometry(t, 3) / 3;
+    gradient += third * load(m.triangle_geometry, t);
+    area += third;
+  }
+  return gradient;
+}
+
+/// Internal forces at positions x, into force [vertex, 3] nN.
+inline void membrane_forces(const MembraneViews& m, const Components<double>& x, const Components<double>& force) {
+  measure_membranes(m, x);
+  evaluate_triangles(m, x);
+  Kokkos::parallel_for(
+      "corpuscle::membrane::gather_forces", Policy(0, m.vertices),
+      KOKKOS_LAMBDA(int i) { store(force, i, gather_force(m, i)); });
+}
+
+}  // namespace corpuscle

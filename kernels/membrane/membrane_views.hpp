@@ -1,0 +1,42 @@
+// The arrays of all membranes, as kernels see them.
+#pragma once
+
+#include "immersed/surface.hpp"
+#include "membrane/sections.hpp"
+#include "membrane/triangle_forces.hpp"
+
+namespace corpuscle {
+
+/// Reference data are held once per cell type, with vertices and triangles numbered within the type as within each of
+/// its cells; a cell itself is only positions and velocities.
+struct MembraneViews {
+  int cells = 0, vertices = 0, triangles = 0;  // totals over all cells
+  SurfaceSet surface;                          // shared with the fluid; the cells are its first bodies
+
+  Array<int> type;                 // [cell]
+  Array<CellLaw> law;              // [type]
+  Array<int> type_first_triangle;  // [type] into the three below
+  Components<double> rest_length;  // [type triangle, 3] um, of the side opposite each corner
+  Components<double> rest_cos;     // [type triangle, 3] of the rest angle of that side
+  Components<double> rest_sin;     // [type triangle, 3]
+  Array<double> rest_area;         // [type triangle] um2
+
+  Table<double> triangle_geometry;  // [triangle, 4] unit normal and area, um2
+  Table<double> totals;             // [cell * sections, 2] area um2 and volume um3 of each section
+  Table<double> corner_force;       // [triangle, 9] force on each corner, nN
+  Components<double> force;         // [vertex, 3] internal force, nN
+  Array<int> status;                // [1] 1 + the highest number of a cell in trouble; 0 if none
+
+  KOKKOS_INLINE_FUNCTION TriangleRest rest(int t) const {
+    TriangleRest r;
+    for (int k = 0; k < 3; ++k) {
+      r.length[k] = rest_length(t, k);
+      r.cos_angle[k] = rest_cos(t, k);
+      r.sin_angle[k] = rest_sin(t, k);
+    }
+    r.area = rest_area(t);
+    return r;
+  }
+};
+
+}  // namespace corpuscle

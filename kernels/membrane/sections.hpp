@@ -1,0 +1,65 @@
+// Deterministic sums per cell: each cell's triangles and vertices are cut into a fixed number of sections, each section
+// is summed by one team, and whoever needs the total adds the sections in order.
+#pragma once
+
+#include <string>
+
+#include "common/types.hpp"
+
+namespace corpuscle {
+
+inline constexpr int sections = 16;  // enough parallel work for one small cell, few enough to add again where needed
+
+/// Several sums at once.
+template <int n>
+struct Sums {
+  double value[n] = {};
+
+  KOKKOS_INLINE_FUNCTION double& operator[](int i) { return value[i]; }
+  KOKKOS_INLINE_FUNCTION double operator[](int i) const { return value[i]; }
+  KOKKOS_INLINE_FUNCTION Sums& operator+=(const Sums& b) {
+    for (int i = 0; i < n; ++i) value[i] += b.value[i];
+    return *this;
+  }
+  // Kokkos 3 joins partial results through volatile references.
+  KOKKOS_INLINE_FUNCTION void operator+=(const volatile Sums& b) volatile {
+    for (int i = 0; i < n; ++i) value[i] = value[i] + b.value[i];
+  }
+};
+
+using SectionTeam = typename Kokkos::TeamPolicy<Exec>::member_type;
+
+template <class Body>
+struct SectionKernel {
+  Body body;
+  KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
+    body(team, team.league_rank() / sections, team.league_rank() % sections);
+  }
+};
+
+/// Run body(team, cell, section) for every section of every cell.
+template <class Body>
+void for_sections(const std::string& label, int cells, const Body& body) {
+  Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells * sections, Kokkos::AUTO), SectionKernel<Body>{body});
+}
+
+/// The part of [first, last) that belongs to a section, shared out over the team.
+KOKKOS_INLINE_FUNCTION auto section_range(const SectionTeam& team, int first, int last, int section) {
+  const int count = last - first, per = count / sections, rest = count % sections;
+  const int begin = first + section * per + (section < rest ? section : rest);
+  return Kokkos::TeamThreadRange(team, begin, begin + per + (section < rest ? 1 : 0));
+}
+
+/// Sum of one column over the sections of a cell. @param sums  [cells * sections, columns]
+KOKKOS_INLINE_FUNCTION double section_total(const Table<double>& sums, int cell, int column) {
+  double total = 0;
+  for (int s = 0; s < sections; ++s) total += sums(cell * sections + s, column);
+  return total;
+}
+
+}  // namespace corpuscle
+
+template <int n>
+struct Kokkos::reduction_identity<corpuscle::Sums<n>> {
+  KOKKOS_FORCEINLINE_FUNCTION static corpuscle::Sums<n> sum() { return {}; }
+};

@@ -1,0 +1,102 @@
+// Geometry and forces of one triangle of the membrane: plain functions of its corners and its neighbours' normals.
+#pragma once
+
+#include "membrane/spring_law.hpp"
+
+namespace corpuscle {
+
+/// Elastic constants of a cell type and its totals at rest.
+struct CellLaw {
+  SpringLaw spring;
+  double bending = 0;             // k_b, fJ
+  double area = 0;                // k_a, nN/um
+  double local_area = 0;          // k_d, nN/um
+  double volume = 0;              // k_v, kPa
+  double rest_area = 1;           // A0, um2
+  double rest_volume = 1;         // V0, um3
+  double vertex_mass = 0;         // pg
+  double central_damping = 0;     // gamma_C of Equation 10, nN us/um
+  double tangential_damping = 0;  // gamma_T
+};
+
+/// Reference state of one triangle: of the side opposite each corner, the rest length and the rest angle.
+struct TriangleRest {
+  double length[3];
+  double cos_angle[3], sin_angle[3];
+  double area;
+};
+
+struct Dihedral {
+  double cosine, sine;
+};
+
+/// Signed angle between two unit normals about their common edge, positive where the surface is convex outward.
+/// @param along  unit vector along the edge, counter-clockwise around the first triangle
+KOKKOS_INLINE_FUNCTION Dihedral dihedral(const Vec3& normal, const Vec3& other, const Vec3& along) {
+  return {dot(normal, other), dot(cross(normal, other), along)};
+}
+
+/// dE/dtheta of E = k_b (1 - cos(theta - theta0)) (Equation 7).
+KOKKOS_INLINE_FUNCTION double bending_moment(const Dihedral& angle, double cos_rest, double sin_rest, double k_b) {
+  return k_b * (angle.sine * cos_rest - angle.cosine * sin_rest);
+}
+
+KOKKOS_INLINE_FUNCTION double bending_energy(const Dihedral& angle, double cos_rest, double sin_rest, double k_b) {
+  return k_b * (1 - (angle.cosine * cos_rest + angle.sine * sin_rest));
+}
+
+struct TriangleState {
+  Vec3 corner[3];
+  Vec3 normal;           // unit, outward
+  double area;           // um2
+  Vec3 other_normal[3];  // of the triangle across the side opposite each corner
+};
+
+/// Sum over the triangle of what the global terms need: dE/dA of the cell and the pressure -dE/dV.
+struct GlobalLoads {
+  double tension;   // k_a (A - A0) / A0, nN/um
+  double pressure;  // -k_v (V - V0) / V0, kPa
+};
+
+KOKKOS_INLINE_FUNCTION GlobalLoads global_loads(double area, double volume, const CellLaw& law) {
+  return {law.area * (area - law.rest_area) / law.rest_area,
+          -law.volume * (volume - law.rest_volume) / law.rest_volume};
+}
+
+/// Forces on the three corners, nN: half of each side's spring, this triangle's part of the bending of each side, and
+/// the area and volume terms (Equations 3 to 8). Each side's other half comes from the triangle across it.
+/// @return the largest of length / l_m over the sides (a length that is not a number gives infinity)
+KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law,
+                                              const GlobalLoads& loads, Vec3 force[3]) {
+  Vec3 side[3];
+  for (int k = 0; k < 3; ++k) side[k] = s.corner[(k + 2) % 3] - s.corner[(k + 1) % 3];
+  const double tension = loads.tension + law.local_area * (s.area - rest.area) / rest.area;
+  const double pressure = loads.pressure * s.area / 3;
+  double along_normal[3] = {pressure, pressure, pressure};
+  // dA/dx of a corner is n x (opposite side) / 2.
+  for (int k = 0; k < 3; ++k) force[k] = (-0.5 * tension) * cross(s.normal, side[k]);
+  const double half_over_area = 0.5 / s.area;
+  double largest = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int a = (k + 1) % 3, b = (k + 2) % 3;
+    const double length = norm(side[k]), inverse = 1 / length;
+    const double x = length / rest.length[k] * SpringLaw::x0;
+    largest = x < 1e300 ? (x > largest ? x : largest) : 1e300;
+    const Vec3 pull = (0.5 * wlc_force(length, rest.length[k], law.spring) * inverse) * side[k];
+    force[a] += pull;
+    force[b] -= pull;
+    // The angle falls by 1/h when corner k rises by 1 along the normal (h its height over the side); the two ends share
+    // the opposite change by the foot of that height, so that the part exerts no net force or torque.
+    const Dihedral angle = dihedral(s.normal, s.other_normal[k], side[k] * inverse);
+    const double moment = bending_moment(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
+    const double per_height = moment * length * half_over_area;
+    const double foot = -dot(side[b], side[k]) * inverse * inverse;
+    along_normal[k] += per_height;
+    along_normal[a] -= (1 - foot) * per_height;
+    along_normal[b] -= foot * per_height;
+  }
+  for (int k = 0; k < 3; ++k) force[k] += along_normal[k] * s.normal;
+  return largest;
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,239 @@
+#include "app/flow_output.hpp"
+
+#include "app/reference_flows.hpp"
+#include "coupling/restart.hpp"
+#include "membrane/shape_measures.hpp"
+#include "output/owned_values.hpp"
+
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+/// Further columns of cells that move in a flow.
+const std::vector<std::string> shape_columns = {"rear_hollow_um", "front_dimple_um", "length_um", "diameter_um",
+                                                "asymmetry"};
+/// Further columns of rigid bodies: the force from the fluid's momentum balance, beside that from tractions.
+const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance_force_y_nN", "balance_force_z_nN"};
+
+std::vector<std::int32_t> to_int32(const Table<int>& table) {
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
+  return {host.data(), host.data() + host.span()};
+}
+
+}  // namespace
+
+FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+                       std::optional<double> restart_us)
+    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us) {
+  const Comm& comm = simulation.grid().comm();
+  HistoryColumns columns;
+  columns.cells = simulation.cells() > 0;
+  columns.bodies = simulation.rigid_bodies() != nullptr;
+  if (columns.cells) columns.more = shape_columns;
+  if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
+  if (simulation.immersed()) history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
+#ifdef CORPUSCLE_HDF5
+  if (scene.output.fields)
+    fields_ = std::make_unique<FieldWriter>(folder, comm, simulation.grid().index(),
+                                            simulation.grid().owned_nodes().data(), restart_us);
+  if (scene.output.cells && simulation.surfaces()) {
+    const auto& set = *simulation.surfaces();
+    const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
+    const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
+    cells_ = std::make_unique<CellWriter>(folder, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
+  }
+#endif
+  if (!simulation.membranes()) return;
+  for (const auto& settings : simulation.membranes()->diagnostics()) {
+    first_area_.push_back(settings.rest_area_um2);
+    first_volume_.push_back(settings.rest_volume_um3);
+  }
+}
+
+/// Whether this step is the last, or the first at or after a multiple of `every_us`.
+bool FlowOutput::due(double every_us) const {
+  if (simulation_.done()) return true;
+  if (every_us <= 0) return false;
+  const double step = scene_.time.step_us, now = simulation_.time();
+  return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
+}
+
+void FlowOutput::gather() {
+  const auto& fluid = simulation_.fluid().statistics();
+  momentum_.add(fluid.momentum_iterations);
+  pressure_.add(fluid.pressure_iterations);
+  const double spacing = simulation_.grid().mean_spacing();
+  if (fluid.reference_speed > 0)
+    divergence_ = std::max(divergence_, fluid.divergence / (fluid.reference_speed * spacing * spacing));
+  flux_correction_ = std::max(flux_correction_, fluid.flux_correction);
+  if (!simulation_.membranes()) return;
+  coupling_.add(simulation_.statistics().coupling_iterations);
+  residual_.add(simulation_.statistics().coupling_residual);
+}
+
+void FlowOutput::after_step(bool start) {
+  const auto scope = timers_.scope("output");
+  if (!start) gather();
+  const auto& output = scene_.output;
+  if (history_ && (start || output.history_every_us <= 0 || due(output.history_every_us))) write_history();
+  if (start || due(output.every_us)) {
+    write_fields();
+    write_cells();
+  }
+  if (!start && due(output.checkpoint_every_us)) write_checkpoint_now();
+}
+
+void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    volume_drift_ = std::max(volume_drift_, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
+    area_drift_ = std::max(area_drift_, std::abs(cells[c].area_um2 / first_area_[c] - 1));
+  }
+}
+
+HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d) const {
+  HistorySample sample;
+  sample.time_us = simulation_.time();
+  sample.cell = cell;
+  sample.centroid_um = d.centroid_um;
+  sample.velocity_um_per_us = d.velocity_um_per_us;
+  sample.extent_um = d.extent_um();
+  sample.area_um2 = d.area_um2;
+  sample.volume_um3 = d.volume_um3;
+  sample.elastic_energy_fJ = d.energy_fJ();
+  const auto& v = d.velocity_um_per_us;
+  const bool moving = std::hypot(v[0], v[1], v[2]) > 1e-9;
+  const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
+                                        moving ? v : scene_.cells[cell].axis);
+  sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};
+  return sample;
+}
+
+void FlowOutput::write_history() {
+  const std::size_t shape = shape_columns.size(), balance = balance_columns.size();
+  const double none = std::nan("");
+  if (auto* membranes = simulation_.membranes()) {
+    const auto cells = membranes->diagnostics();
+    watch_cells(cells);
+    for (int c = 0; c < simulation_.cells(); ++c) {
+      auto sample = cell_sample(c, cells[c]);
+      if (simulation_.rigid_bodies()) sample.more.resize(shape + balance, none);
+      history_->write(sample);
+    }
+  }
+  auto* bodies = simulation_.rigid_bodies();
+  if (!bodies) return;
+  auto& immersed = *simulation_.immersed();
+  if (!simulation_.membranes() && simulation_.steps() > 0) immersed.tractions();
+  std::vector<Triple> centre(simulation_.surfaces()->bodies);
+  for (int b = 0; b < bodies->count(); ++b) centre[simulation_.cells() + b] = bodies->centre(b);
+  const auto loads = immersed.loads(centre);
+  const auto balance_force = immersed.balance_forces();
+  for (int b = 0; b < bodies->count(); ++b) {
+    const int number = simulation_.cells() + b;
+    HistorySample sample;
+    sample.time_us = simulation_.time();
+    sample.cell = number;
+    sample.centroid_um = bodies->centre(b);
+    sample.velocity_um_per_us = bodies->velocity(b);
+    sample.force_nN = loads[number][0];
+    sample.torque_nN_um = loads[number][1];
+    if (simulation_.membranes()) sample.more.assign(shape, none);
+    for (double f : balance_force[number]) sample.more.push_back(f);
+    history_->write(sample);
+  }
+}
+
+void FlowOutput::write_fields() {
+#ifdef CORPUSCLE_HDF5
+  if (!fields_) return;
+  const IndexSpace& index = simulation_.grid().index();
+  const CellBox owned{{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
+  std::vector<CellField> fields;
+  std::vector<CellLabels> labels;
+  std::vector<double> velocity, pressure;
+  std::vector<std::int8_t> kind;
+  if (scene_.output.velocity) {
+    velocity = interleaved(index, owned, simulation_.fluid().velocity());
+    fields.push_back({"velocity_um_per_us", 3, velocity.data()});
+  }
+  if (scene_.output.pressure) {
+    pressure = box_values(index, owned, simulation_.fluid().pressure());
+    fields.push_back({"pressure_kPa", 1, pressure.data()});
+  }
+  if (scene_.output.kind) {
+    for (auto value : box_integers(index, owned, simulation_.fluid().kind()))
+      kind.push_back(static_cast<std::int8_t>(value));
+    labels.push_back({"kind", kind.data()});
+  }
+  fields_->write(simulation_.time(), simulation_.steps(), fields, labels);
+#endif
+}
+
+void FlowOutput::write_cells() {
+  if (!simulation_.surfaces()) return;
+  if (simulation_.steps() > 0) {
+    if (!simulation_.membranes()) simulation_.immersed()->tractions();
+    const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
+    slip_ = std::max(slip_, simulation_.immersed()->slip()[1] / speed);
+  }
+#ifdef CORPUSCLE_HDF5
+  if (!cells_) return;
+  const auto& set = *simulation_.surfaces();
+  const auto x = vertex_values(set.vertices, set.x), v = vertex_values(set.vertices, set.v);
+  const auto traction = vertex_values(set.vertices, simulation_.immersed()->last_tractions());
+  cells_->write(simulation_.time(), simulation_.steps(), x.data(),
+                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}});
+#endif
+}
+
+void FlowOutput::write_checkpoint_now() {
+#ifdef CORPUSCLE_HDF5
+  const std::string path = folder_ + "/checkpoint.h5";
+  write_checkpoint(path, simulation_, scene_.resolved);
+  last_checkpoint_ = path;
+#endif
+}
+
+void FlowOutput::fill(Report& report) {
+  auto& errors = report.errors;
+  errors["max_divergence"] = divergence_;
+  errors["flux_correction"] = flux_correction_;
+  errors["splitting"] = simulation_.fluid().statistics().splitting;
+  errors["convection_over_viscosity"] = simulation_.fluid().convection_over_viscosity();
+  if (simulation_.surfaces()) {
+    errors["slip"] = slip_;
+    const auto& search = simulation_.immersed()->report();
+    report.extra["immersed"] = {{"classifications", search.classifications},
+                                {"immersed_nodes", search.immersed},
+                                {"inside_nodes", search.inside},
+                                {"isolated_nodes", search.isolated},
+                                {"uncovered_nodes", search.uncovered},
+                                {"velocity_fallbacks", search.velocity_fallbacks},
+                                {"least_wall_spacings", search.least_wall_spacings},
+                                {"traction_fits", simulation_.immersed()->boundary().traction_fallbacks()}};
+  }
+  if (simulation_.membranes()) {
+    errors["volume_drift"] = volume_drift_;
+    errors["area_drift"] = area_drift_;
+    errors["coupling_residual"] = residual_.samples ? residual_.sum / residual_.samples : 0.0;
+    errors["coupling_residual_max"] = residual_.largest;
+    const auto& s = simulation_.stability();
+    report.extra["stability"] = {{"mass_term_pg_per_um2_per_us", s.mass_term},
+                                 {"beta_pg_per_um2_per_us", s.beta},
+                                 {"threshold_pg_per_um2_per_us", s.threshold},
+                                 {"margin", s.margin()}};
+  }
+  for (const auto& [name, value] : reference_errors(scene_, simulation_)) errors[name] = value;
+  report.momentum_iterations = momentum_;
+  report.pressure_iterations = pressure_;
+  report.coupling_iterations = coupling_;
+  report.extra["pressure_setups"] = simulation_.fluid().pressure_setups();
+  report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],
+                           simulation_.grid().index().global[2]};
+  report.steps = simulation_.steps();
+  report.simulated_us = simulation_.time();
+}
+
+}  // namespace corpuscle

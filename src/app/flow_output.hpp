@@ -1,0 +1,54 @@
+// What a flow run writes: history, fields, cells, checkpoints, and the error figures of the report.
+#pragma once
+
+#include "coupling/flow_simulation.hpp"
+#include "output/cell_writer.hpp"
+#include "output/field_writer.hpp"
+#include "output/history.hpp"
+#include "output/report.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace corpuscle {
+
+class FlowOutput {
+ public:
+  /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
+  FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+             std::optional<double> restart_us);
+
+  /// After every step (and before the first, with `start`): whatever is due.
+  void after_step(bool start = false);
+  /// The state as it is, at the end of a run that has finished or broken down.
+  void write_checkpoint_now();
+  const std::string& last_checkpoint() const { return last_checkpoint_; }
+  /// Errors, iterations and counts gathered over the run.
+  void fill(Report& report);
+
+ private:
+  bool due(double every_us) const;
+  void gather();
+  void write_history();
+  void write_fields();
+  void write_cells();
+  HistorySample cell_sample(int cell, const CellDiagnostics& d) const;
+  void watch_cells(const std::vector<CellDiagnostics>& cells);
+
+  std::string folder_;
+  Case scene_;
+  FlowSimulation& simulation_;
+  Timers& timers_;
+  std::optional<double> restart_us_;
+  std::unique_ptr<HistoryWriter> history_;
+#ifdef CORPUSCLE_HDF5
+  std::unique_ptr<FieldWriter> fields_;
+  std::unique_ptr<CellWriter> cells_;
+#endif
+  std::string last_checkpoint_;
+  std::vector<double> first_area_, first_volume_;
+  Tally momentum_, pressure_, coupling_, residual_;
+  double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,238 @@
+#include "app/run.hpp"
+
+#include "app/flow_output.hpp"
+#include "app/modules.hpp"
+#include "core/error.hpp"
+#include "core/log.hpp"
+#include "coupling/restart.hpp"
+#include "membrane/mesh_generator.hpp"
+#include "membrane/mesh_io.hpp"
+#include "membrane/stretching.hpp"
+#include "output/checkpoint.hpp"
+#include "output/on_root.hpp"
+#include "output/owned_values.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+namespace corpuscle {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+void print_start(const Comm& comm, const Case& scene) {
+  info("{}", scene.title.empty() ? scene.path : scene.title);
+  info("corpuscle {}, {} on {} rank{} x {} thread{}", git_hash(), backend_name(), comm.size(),
+       comm.size() == 1 ? "" : "s", thread_count(), thread_count() == 1 ? "" : "s");
+  print_modules(list_modules(scene, comm.size()));
+  for (const auto& line : outputs_left_out(scene.output)) warn("{}", line);
+}
+
+Report start_report(const Comm& comm, const Case& scene) {
+  Report report;
+  report.case_path = scene.path;
+  report.title = scene.title;
+  report.resolved = scene.resolved;
+  const auto modules = list_modules(scene, comm.size());
+  report.active = modules.active;
+  report.left_out = modules.left_out;
+  return report;
+}
+
+void print_end(const Report& report, const std::string& folder) {
+  info("{} steps, {:.6g} us in {:.3g} s, {:.0f} MB", report.steps, report.simulated_us, report.wall_s, peak_rss_mb());
+  std::string parts;
+  for (const auto& [part, seconds] : report.wall_s_by_part) parts += fmt::format("  {} {:.3g} s", part, seconds);
+  info("time:  {}", parts);
+  std::string errors;
+  for (const auto& [name, value] : report.errors.items())
+    if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
+  info("errors:{}", errors);
+  info("results in {}", folder);
+}
+
+void run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const std::string& folder) {
+  const auto start = Clock::now();
+  Timers timers;
+  FlowSimulation simulation(comm, scene, timers);
+  if (simulation.membranes()) {
+    const auto& s = simulation.stability();
+    info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against mu / h = {:.3g} pg/um2/us, a margin of {:.2f}",
+         s.mass_term, s.beta, s.threshold, s.margin());
+  }
+  std::optional<double> restart_us;
+#ifdef CORPUSCLE_HDF5
+  if (!options.restart.empty()) {
+    read_checkpoint(options.restart, simulation);
+    restart_us = simulation.time();
+    info("continuing from {:.6g} us", simulation.time());
+    if (simulation.done())
+      throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us",
+                                   options.restart, simulation.time()));
+  }
+#else
+  if (!options.restart.empty())
+    throw InputError("--restart: this build has no HDF5, so it has no checkpoints; configure with -DCORPUSCLE_HDF5=ON");
+#endif
+  FlowOutput output(folder, scene, simulation, timers, restart_us);
+  if (!restart_us) output.after_step(true);
+  Report report = start_report(comm, scene);
+  Progress progress(scene.time.end_us, simulation.total_steps() - simulation.steps());
+  const long first = simulation.steps();
+  try {
+    while (!simulation.done()) {
+      simulation.step();
+      output.after_step();
+      progress.update(simulation.steps() - first, simulation.time());
+    }
+  } catch (const ComputationError& error) {
+    progress.finish();
+    throw ComputationError(fmt::format(
+        "at {:.6g} us (step {}): {}. Last good checkpoint: {}", simulation.time() + scene.time.step_us,
+        simulation.steps() + 1, error.what(),
+        output.last_checkpoint().empty() ? "none yet (output.checkpoint_every_us)" : output.last_checkpoint()));
+  }
+  progress.finish();
+  output.fill(report);
+  report.wall_s = seconds_since(start);
+  report.wall_s_by_part = timers.seconds();
+  write_report(folder, comm, report);
+  print_end(report, folder);
+}
+
+void run_stretching(const Comm& comm, const Case& scene, const std::string& folder) {
+  const auto start = Clock::now();
+  Timers timers;
+  Report report = start_report(comm, scene);
+  HistoryColumns columns;
+  columns.cells = columns.stretching = true;
+  HistoryWriter history(folder, comm, columns);
+  Membranes membranes(scene.cells);
+#ifdef CORPUSCLE_HDF5
+  std::unique_ptr<CellWriter> cells;
+  if (scene.output.cells) {
+    const auto& set = membranes.surfaces();
+    const auto mesh = body_mesh(set, 0);
+    std::vector<std::int32_t> triangles;
+    for (const auto& t : mesh.triangles) triangles.insert(triangles.end(), t.begin(), t.end());
+    cells = std::make_unique<CellWriter>(folder, comm, triangles, std::vector<std::int32_t>(set.triangles, 0),
+                                         set.vertices);
+  }
+#endif
+  timers.start("relaxation");
+  long number = 0;
+  const auto result = stretch_cell(membranes, *scene.stretching, [&](const StretchingStep& step) {
+    const auto scope = timers.scope("output");
+    HistorySample sample;
+    sample.cell = 0;
+    sample.centroid_um = step.cell.centroid_um;
+    sample.extent_um = step.cell.extent_um();
+    sample.area_um2 = step.cell.area_um2;
+    sample.volume_um3 = step.cell.volume_um3;
+    sample.elastic_energy_fJ = step.cell.energy_fJ();
+    sample.axial_um = step.axial_um;
+    sample.transverse_um = step.transverse_um;
+    sample.force_pN = step.force_pN;
+    history.write(sample);
+#ifdef CORPUSCLE_HDF5
+    if (cells)
+      cells->write(step.force_pN, number, vertex_values(membranes.vertices(), membranes.surfaces().x).data());
+#endif
+    ++number;
+    info("{:7.1f} pN   axial {:7.3f} um   transverse {:7.3f} um   {:6d} iterations   residual {:.1e}", step.force_pN,
+         step.axial_um, step.transverse_um, step.iterations, step.residual);
+  });
+  timers.stop();
+  report.steps = number;
+  const auto& last = result.steps.back();
+  report.errors["volume_drift"] = std::abs(last.cell.volume_um3 / last.cell.rest_volume_um3 - 1);
+  report.errors["area_drift"] = std::abs(last.cell.area_um2 / last.cell.rest_area_um2 - 1);
+  report.errors["rest_residual"] = last.residual;
+  report.extra["rest_shape"] = {{"diameter_um", result.rest.diameter_um},
+                                {"thickness_center_um", result.rest.thickness_center_um},
+                                {"thickness_max_um", result.rest.thickness_max_um}};
+  report.extra["patch_vertices"] = result.patch_vertices;
+  if (!scene.stretching->experiment.empty()) {
+    const auto comparison = compare(result, read_experiment(scene.stretching->experiment));
+    report.errors["experiment_axial_rms_um"] = comparison.rms_axial_um;
+    report.errors["experiment_transverse_rms_um"] = comparison.rms_transverse_um;
+    report.errors["experiment_points_inside_bars"] = comparison.inside_both;
+    report.errors["experiment_points"] = comparison.points;
+  }
+  report.wall_s = seconds_since(start);
+  report.wall_s_by_part = timers.seconds();
+  write_report(folder, comm, report);
+  print_end(report, folder);
+}
+
+std::string result_folder(const RunOptions& options) {
+  if (!options.folder.empty()) return options.folder;
+  return "runs/" + std::filesystem::path(options.case_path).stem().string();
+}
+
+}  // namespace
+
+void run_case(const Comm& comm, const RunOptions& options) {
+  const Case scene = read_case(options.case_path, options.overrides);
+  const std::string folder = result_folder(options);
+  on_root(comm, [&] { prepare_folder(folder); });
+  print_start(comm, scene);
+  if (scene.stretching) {
+    if (!options.restart.empty()) throw InputError("--restart: a stretching test has no checkpoints; run it again");
+    if (comm.size() > 1)
+      throw InputError(fmt::format("a stretching test runs on one rank, not {}: start it without mpirun", comm.size()));
+    run_stretching(comm, scene, folder);
+  } else {
+    run_flow(comm, scene, options, folder);
+  }
+}
+
+void check_case(const Comm& comm, const RunOptions& options) {
+  const Case scene = read_case(options.case_path, options.overrides);
+  print_start(comm, scene);
+  if (scene.stretching) {
+    Membranes membranes(scene.cells);
+    info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
+    info("estimate: {:.0f} MB, {:.2g} s", peak_rss_mb(), 1.2e-6 * membranes.vertices() * 3000.0 * scene.stretching->steps);
+    info("{} is valid", scene.path);
+    return;
+  }
+  Timers timers;
+  FlowSimulation simulation(comm, scene, timers);
+  const auto& index = simulation.grid().index();
+  const double nodes = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
+  info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,
+       simulation.surfaces() ? simulation.surfaces()->vertices : 0);
+  if (simulation.membranes()) {
+    const auto& s = simulation.stability();
+    info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, mu / h = {:.3g} pg/um2/us)",
+         s.margin(), s.mass_term, s.beta, s.threshold);
+    auto& membranes = *simulation.membranes();
+    const double stable = membranes.stable_step_us();
+    info("membrane: undamped stable step {:.3g} us, {} sub-steps a step", stable,
+         membranes.substeps(scene.time.step_us, s.beta));
+  }
+  // Seconds per cell and step on one core: of the tube without and with a cell, an order of magnitude.
+  const double rate = simulation.surfaces() ? 3e-6 : 1.5e-6;
+  const double cores = static_cast<double>(comm.size()) * thread_count();
+  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", comm.sum(peak_rss_mb()), simulation.total_steps(),
+       rate * nodes * simulation.total_steps() / cores);
+  info("{} is valid", scene.path);
+}
+
+void write_mesh(int vertices, const std::string& path) {
+  const TriangleMesh mesh = biconcave_mesh(vertices);
+  const bool stl = std::filesystem::path(path).extension() == ".stl";
+  if (stl)
+    write_stl(path, mesh, StlFormat::binary);
+  else
+    write_off(path, mesh);
+  info("{}: {} vertices, {} triangles, area {:.2f} um2, volume {:.2f} um3", path, mesh.vertices.size(),
+       mesh.triangles.size(), area(mesh), volume(mesh));
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,27 @@
+// The commands of the program.
+#pragma once
+
+#include "parallel/comm.hpp"
+
+#include <string>
+#include <vector>
+
+namespace corpuscle {
+
+struct RunOptions {
+  std::string case_path;
+  std::string folder;                  // empty: runs/<name of the case file>
+  std::vector<std::string> overrides;  // section.key=value
+  std::string restart;                 // checkpoint to continue from; empty: from the start
+};
+
+/// Run a case to its end. @throws InputError, ComputationError
+void run_case(const Comm& comm, const RunOptions& options);
+
+/// Validate a case and print modules, unknowns and estimates of memory and time; run nothing. @throws InputError
+void check_case(const Comm& comm, const RunOptions& options);
+
+/// Write the biconcave mesh with exactly this many vertices as OFF or STL. @throws InputError
+void write_mesh(int vertices, const std::string& path);
+
+}  // namespace corpuscle

@@ -1,0 +1,100 @@
+#include "core/log.hpp"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+namespace {
+
+struct LogState {
+  bool root = true, quiet = false;
+  bool line_open = false;  // a progress line without its end
+  spdlog::logger out{"out", std::make_shared<spdlog::sinks::stdout_sink_mt>()};
+  spdlog::logger err{"err", std::make_shared<spdlog::sinks::stderr_sink_mt>()};
+
+  LogState() {
+    out.set_pattern("%v");
+    err.set_pattern("%v");
+    out.flush_on(spdlog::level::info);
+  }
+  void close_line() {
+    if (line_open) std::fputc('\n', stdout), std::fflush(stdout);
+    line_open = false;
+  }
+};
+
+LogState& state() {
+  static LogState log;
+  return log;
+}
+
+std::string duration_text(double seconds) {
+  const long s = std::lround(seconds);
+  if (s < 60) return fmt::format("{} s", s);
+  if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
+  return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
+}
+
+}  // namespace
+
+void open_log(bool root, bool quiet) {
+  state().root = root;
+  state().quiet = quiet;
+}
+
+void log_info(const std::string& message) {
+  auto& log = state();
+  if (!log.root || log.quiet) return;
+  log.close_line();
+  log.out.info(message);
+}
+
+void log_warning(const std::string& message) {
+  auto& log = state();
+  if (!log.root) return;
+  log.close_line();
+  log.err.warn("warning: " + message);
+}
+
+void log_error(const std::string& message, bool everywhere) {
+  auto& log = state();
+  if (!log.root && !everywhere) return;
+  log.close_line();
+  log.err.error("error: " + message);
+}
+
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s) {
+  const double percent = end_us > 0 ? std::floor(1000 * std::min(1.0, time_us / end_us)) / 10 : 100;
+  return fmt::format("{:.1f} %  {:g} of {:g} us  {:.3g} steps/s  {}", percent, time_us, end_us, steps_per_s,
+                     left_s < 0 ? "" : duration_text(left_s) + " left");
+}
+
+Progress::Progress(double end_us, long steps)
+    : end_us_(end_us), steps_(steps), terminal_(isatty(STDOUT_FILENO) == 1), shown_(Clock::now()) {}
+
+void Progress::update(long step, double time_us) {
+  auto& log = state();
+  if (!log.root || log.quiet) return;
+  const double since = std::chrono::duration<double>(Clock::now() - shown_).count();
+  if (since < (terminal_ ? 0.5 : 10.0)) return;
+  const double rate = (step - shown_step_) / since;
+  rate_ = rate_ > 0 ? 0.7 * rate_ + 0.3 * rate : rate;
+  shown_ = Clock::now();
+  shown_step_ = step;
+  const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0);
+  if (terminal_) {
+    fmt::print("\r{:<78}", text);
+    std::fflush(stdout);
+    log.line_open = true;
+  } else {
+    log_info(text);
+  }
+}
+
+void Progress::finish() { state().close_line(); }
+
+}  // namespace corpuscle

@@ -1,0 +1,57 @@
+// What the program says while it runs: on rank 0 only, plain lines.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+
+namespace corpuscle {
+
+/// Before the first message: which rank speaks, and how much. Warnings and errors go to stderr, the rest to stdout.
+void open_log(bool root, bool quiet = false);
+
+void log_info(const std::string& message);
+void log_warning(const std::string& message);
+/// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
+void log_error(const std::string& message, bool everywhere = false);
+
+template <class... Args>
+void info(fmt::format_string<Args...> format, Args&&... args) {
+  log_info(fmt::format(format, std::forward<Args>(args)...));
+}
+template <class... Args>
+void warn(fmt::format_string<Args...> format, Args&&... args) {
+  log_warning(fmt::format(format, std::forward<Args>(args)...));
+}
+
+/// "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left"
+/// @param left_s  negative while there is no estimate yet
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s);
+
+/// The progress line: rewritten in place on a terminal, otherwise a new line every ten seconds.
+class Progress {
+ public:
+  /// @param steps  all steps of this run, from its start or restart to its end
+  Progress(double end_us, long steps);
+  ~Progress() { finish(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// After each step: `step` of this run, 1 to `steps`.
+  void update(long step, double time_us);
+  /// End the line. Called by the destructor as well.
+  void finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double end_us_;
+  long steps_;
+  bool terminal_;
+  Clock::time_point shown_;
+  long shown_step_ = 0;
+  double rate_ = 0;  // steps/s, recent ones weigh most
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,86 @@
+// A scene with fluid, advanced in time: the flow, the bodies in it, and the coupling between them.
+#pragma once
+
+#include "coupling/immersed_flow.hpp"
+#include "coupling/rigid_bodies.hpp"
+#include "membrane/membranes.hpp"
+
+#include <memory>
+
+namespace corpuscle {
+
+/// Stability of the coupling, estimated before the first step.
+struct StabilityEstimate {
+  double mass_term = 0;   // M / (A dt), pg/um2/us
+  double beta = 0;        // Robin coefficient in use, pg/um2/us
+  double threshold = 0;   // half the largest reaction of the fluid, mu / h
+  double margin() const { return (mass_term + beta) / threshold; }
+};
+
+struct StepStatistics {
+  int coupling_iterations = 0, substeps = 0;
+  double coupling_residual = 0;  // change of the interface velocity that one more iteration would make, relative
+};
+
+/// Only what the case asks for exists: without cells no membranes, without surfaces no search.
+class FlowSimulation {
+ public:
+  /// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them
+  FlowSimulation(const Comm& comm, const Case& scene, Timers& timers);
+
+  /// One step of time.step_us.
+  /// @throws ComputationError  when anything breaks down; the message says what, where and why
+  void step();
+
+  double time() const { return time_; }
+  long steps() const { return steps_; }
+  long total_steps() const { return total_steps_; }
+  bool done() const { return steps_ >= total_steps_; }
+
+  Grid& grid() { return *grid_; }
+  FluidSolver& fluid() { return *fluid_; }
+  /// Null where the case has none.
+  Membranes* membranes() { return membranes_.get(); }
+  RigidBodies* rigid_bodies() { return rigid_bodies_.get(); }
+  ImmersedFlow* immersed() { return immersed_.get(); }
+  const SurfaceSet* surfaces() const { return surfaces_ ? surfaces_.get() : nullptr; }
+  const StepStatistics& statistics() const { return statistics_; }
+  const StabilityEstimate& stability() const { return stability_; }
+  int cells() const { return membranes_ ? membranes_->cells() : 0; }
+
+  /// State beyond that of fluid and membranes, for checkpoints.
+  struct Progress {
+    double time = 0, relaxation = 0;
+    long steps = 0;
+  };
+  Progress progress() const { return {time_, relaxation_, steps_}; }
+  void resume(const Progress& progress);
+
+  /// A vertex must keep this many grid spacings from walls: at the start, and later.
+  static constexpr double starting_gap = 1.0, smallest_gap = 0.75;
+
+ private:
+  void make_surfaces();
+  void check_start();
+  void estimate_stability();
+  void step_rigid(double dt);
+  void step_staggered(double dt);
+  void step_iterated(double dt);
+  void place_bodies(double dt);
+
+  Case scene_;
+  Timers& timers_;
+  std::unique_ptr<Grid> grid_;
+  std::unique_ptr<FluidSolver> fluid_;
+  std::unique_ptr<Membranes> membranes_;
+  std::unique_ptr<SurfaceSet> surfaces_;
+  std::unique_ptr<RigidBodies> rigid_bodies_;
+  std::unique_ptr<ImmersedFlow> immersed_;
+  Components<double> x_start_, v_interface_, v_answer_, residual_, previous_residual_;
+  StabilityEstimate stability_;
+  StepStatistics statistics_;
+  double time_ = 0, relaxation_ = 0.5;
+  long steps_ = 0, total_steps_ = 0;
+};
+
+}  // namespace corpuscle

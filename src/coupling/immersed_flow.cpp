@@ -1,0 +1,136 @@
+#include "coupling/immersed_flow.hpp"
+
+#include "core/error.hpp"
+#include "immersed/surface_motion.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace corpuscle {
+
+ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers)
+    : fluid_(fluid), surfaces_(surfaces), timers_(timers) {
+  ImmersedOptions options;
+  for (int side = 0; side < 6; ++side) options.wall[side] = fluid.boundaries().is_wall(side);
+  for (int d = 0; d < 3; ++d) {
+    const Triple& p = fluid.grid().period(d);
+    options.period[d] = {p[0], p[1], p[2]};
+  }
+  boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
+  bodies_.bodies = surfaces.bodies;
+  bodies_.growth = Array<double>("corpuscle::immersed::growth", surfaces.bodies);
+  traction_ = Components<double>("corpuscle::coupling::traction", surfaces.vertices, 3);
+  traction_host_ = Kokkos::create_mirror_view(traction_);
+}
+
+void ImmersedFlow::check_positions(double smallest_gap) {
+  const auto& counts = boundary_->counts();
+  const Comm& comm = fluid_.grid().comm();
+  const double nearest = comm.min(counts.wall_spacings);
+  report_.least_wall_spacings = std::min(report_.least_wall_spacings, nearest);
+  const bool lost = comm.max(counts.lost_vertex >= 0 ? 1.0 : 0.0) > 0;
+  if (lost) {
+    const int vertex = static_cast<int>(comm.max(static_cast<double>(counts.lost_vertex)));
+    throw ComputationError(fmt::format(
+        "position: {} lies outside the grid. Likely cause: the cell was placed there, has reached the end of the grid, "
+        "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
+        boundary_->describe_vertex(vertex)));
+  }
+  if (nearest < smallest_gap) {
+    const bool here = counts.wall_spacings == nearest;
+    const int vertex = static_cast<int>(comm.max(here ? static_cast<double>(counts.wall_vertex) : -1.0));
+    throw ComputationError(fmt::format(
+        "gap to the wall: {} is {:.2f} grid spacings from a wall, and {:.2f} are needed to resolve the film between "
+        "them. Contact forces do not exist yet: move or tilt the cell (center_um, axis), refine the grid (grid.nodes) "
+        "or use a wider channel",
+        boundary_->describe_vertex(vertex), nearest, smallest_gap));
+  }
+}
+
+void ImmersedFlow::check_resolution() {
+  const auto& counts = boundary_->counts();
+  for (int b = 0; b < surfaces_.bodies; ++b) {
+    const long nodes = fluid_.grid().comm().sum(static_cast<long>(counts.body_immersed[b] + counts.body_inside[b]));
+    if (nodes == 0)
+      throw ComputationError(fmt::format(
+          "body {}: no grid node lies in or next to it, so the flow does not see it: refine the grid (grid.nodes)", b));
+  }
+}
+
+void ImmersedFlow::update_geometry(double smallest_gap) {
+  const auto scope = timers_.scope("search");
+  update_surface_geometry(surfaces_);
+  boundary_->classify();
+  check_positions(smallest_gap);
+  if (report_.classifications == 0) check_resolution();
+  boundary_->build_stencils();
+  const auto& counts = boundary_->counts();
+  report_.classifications += 1;
+  report_.immersed = std::max(report_.immersed, counts.immersed);
+  report_.inside = std::max(report_.inside, counts.inside);
+  report_.isolated = std::max(report_.isolated, counts.isolated);
+  report_.uncovered += counts.uncovered;
+  for (int kind = static_cast<int>(RowKind::least_squares); kind < row_kinds; ++kind)
+    report_.velocity_fallbacks += counts.velocity_rows[kind];
+  bodies_.rows = counts.immersed;
+  bodies_.velocity = boundary_->velocity_stencils();
+  bodies_.pressure = boundary_->pressure_stencils();
+  bodies_.u_surface = boundary_->surface_velocity();
+  bodies_.faces = boundary_->faces();
+  const auto matrix = timers_.scope("pressure matrix");
+  fluid_.grid().halo().exchange(boundary_->nodes().kind);
+  fluid_.set_kinds(boundary_->nodes().kind);
+}
+
+void ImmersedFlow::solve(double time) {
+  {
+    const auto scope = timers_.scope("search");
+    boundary_->update_surface_velocity();
+    body_growth(surfaces_, bodies_.growth);
+    fill_inside_velocity(fluid_.grid().index(), surfaces_, boundary_->band(), boundary_->nodes(), fluid_.velocity());
+  }
+  fluid_.solve(time, &bodies_);
+}
+
+const Components<double>& ImmersedFlow::tractions() {
+  const auto scope = timers_.scope("tractions");
+  TractionInput input;
+  input.u = fluid_.velocity();
+  input.p = fluid_.pressure();
+  input.viscosity = fluid_.viscosity();
+  input.pressure_gradient = fluid_.imposed_gradient();
+  const auto& own = boundary_->tractions(input);
+  if (fluid_.grid().comm().size() == 1) {
+    Kokkos::deep_copy(traction_, own.total);
+  } else {
+    Kokkos::deep_copy(traction_host_, own.total);
+    fluid_.grid().comm().sum(traction_host_.data(), static_cast<int>(traction_host_.span()));
+    Kokkos::deep_copy(traction_, traction_host_);
+  }
+  return traction_;
+}
+
+std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>& centre) {
+  Components<double> at("corpuscle::immersed::centre", surfaces_.bodies, 3);
+  Components<double> loads("corpuscle::immersed::loads", surfaces_.bodies, 6);
+  auto at_host = Kokkos::create_mirror_view(at);
+  for (int b = 0; b < surfaces_.bodies; ++b)
+    for (int m = 0; m < 3; ++m) at_host(b, m) = centre[b][m];
+  Kokkos::deep_copy(at, at_host);
+  boundary_->loads(traction_, at, loads);
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), loads);
+  std::vector<std::array<Triple, 2>> result(surfaces_.bodies);
+  for (int b = 0; b < surfaces_.bodies; ++b)
+    for (int m = 0; m < 3; ++m) result[b][0][m] = host(b, m), result[b][1][m] = host(b, 3 + m);
+  return result;
+}
+
+std::array<double, 2> ImmersedFlow::slip() {
+  const Slip own = boundary_->slip(fluid_.velocity());
+  const Comm& comm = fluid_.grid().comm();
+  const double vertices = comm.sum(static_cast<double>(boundary_->counts().owned_vertices));
+  return {comm.max(own.largest), std::sqrt(comm.sum(own.square) / std::max(vertices, 1.0))};
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,64 @@
+// The flow around immersed surfaces: geometry, one fluid solve, tractions; summed over ranks.
+#pragma once
+
+#include "core/timers.hpp"
+#include "fluid/fluid_solver.hpp"
+#include "immersed/immersed_boundary.hpp"
+
+#include <memory>
+
+namespace corpuscle {
+
+/// Worst counts over a run, for the report.
+struct ImmersedReport {
+  long classifications = 0;
+  int immersed = 0, inside = 0, isolated = 0;
+  long uncovered = 0;               // nodes that came out of a body, over the run
+  long velocity_fallbacks = 0;      // rows worse than one probe, over the run
+  long traction_fallbacks = 0;      // fits worse than the first choice, at the last output
+  double least_wall_spacings = 1e30;
+};
+
+class ImmersedFlow {
+ public:
+  ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers);
+
+  /// Classify nodes and build all stencils at the surfaces' present positions.
+  /// @param smallest_gap  refuse vertices nearer to a wall than this many local spacings
+  /// @throws ComputationError  vertex outside the grid or too near to a wall, body too small for the grid
+  void update_geometry(double smallest_gap);
+  /// Solve the flow with the surfaces' present velocities.
+  void solve(double time_us);
+  /// Traction of the fluid on every vertex, [vertex, 3] kPa, the same on all ranks.
+  const Components<double>& tractions();
+
+  /// The last tractions, zero before the first.
+  const Components<double>& last_tractions() const { return traction_; }
+
+  /// Force and torque (about `centre`, [body]) of each body from the last tractions, nN and nN um.
+  std::vector<std::array<Triple, 2>> loads(const std::vector<Triple>& centre);
+  /// The same forces from the fluid's momentum balance over the faces around each body.
+  std::vector<Triple> balance_forces() { return fluid_.body_forces(bodies_); }
+  /// Largest and rms difference between the fluid's velocity carried to the surface and the surface's own, um/us.
+  std::array<double, 2> slip();
+
+  const ImmersedReport& report() const { return report_; }
+  FluidSolver& fluid() { return fluid_; }
+  ImmersedBoundary& boundary() { return *boundary_; }
+  const EmbeddedBodies& bodies() const { return bodies_; }
+
+ private:
+  void check_positions(double smallest_gap);
+  void check_resolution();
+
+  FluidSolver& fluid_;
+  SurfaceSet surfaces_;
+  Timers& timers_;
+  std::unique_ptr<ImmersedBoundary> boundary_;
+  EmbeddedBodies bodies_;
+  Components<double> traction_;
+  Components<double>::HostMirror traction_host_;
+  ImmersedReport report_;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,154 @@
+#include "coupling/restart.hpp"
+
+#ifdef CORPUSCLE_HDF5
+
+#include "output/checkpoint.hpp"
+#include "output/owned_values.hpp"
+
+#include <cstring>
+
+namespace corpuscle {
+
+namespace {
+
+Shape cell_shape(const IndexSpace& index, int components) {
+  Shape s{hsize_t(index.global[2]), hsize_t(index.global[1]), hsize_t(index.global[0])};
+  if (components > 1) s.push_back(components);
+  return s;
+}
+
+Slab cell_slab(const IndexSpace& index, int components) {
+  Slab s{{hsize_t(index.first[2]), hsize_t(index.first[1]), hsize_t(index.first[0])},
+         {hsize_t(index.n[2]), hsize_t(index.n[1]), hsize_t(index.n[0])}};
+  if (components > 1) s.offset.push_back(0), s.count.push_back(components);
+  return s;
+}
+
+/// Face fluxes are stored with one face more than cells along their direction; the extra one belongs to the last rank.
+Shape face_shape(const IndexSpace& index, int d) {
+  Shape s = cell_shape(index, 1);
+  s[2 - d] += 1;
+  return s;
+}
+
+Slab face_slab(const IndexSpace& index, int d) {
+  Slab s = cell_slab(index, 1);
+  if (index.first[d] + index.n[d] == index.global[d]) s.count[2 - d] += 1;
+  return s;
+}
+
+CellBox face_range(const IndexSpace& index, int d) {
+  CellBox box{{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
+  if (index.first[d] + index.n[d] == index.global[d]) box.upper[d] += 1;
+  return box;
+}
+
+CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}; }
+
+const char* flux_name(int d) { return std::array<const char*, 3>{"flux_i", "flux_j", "flux_k"}[d]; }
+const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i", "flux_old_j", "flux_old_k"}[d]; }
+
+}  // namespace
+
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved) {
+  const IndexSpace& index = simulation.grid().index();
+  const auto progress = simulation.progress();
+  CheckpointHeader header;
+  header.resolved = resolved;
+  header.cells = {index.global[0], index.global[1], index.global[2]};
+  header.step = progress.steps;
+  header.time_us = progress.time;
+  CheckpointWriter file(path, simulation.grid().comm(), header);
+  const auto state = simulation.fluid().state();
+  const CellBox owned = owned_box(index);
+  const auto vector = [&](const char* name, const Components<double>& field) {
+    file.add(name, cell_shape(index, 3), cell_slab(index, 3), interleaved(index, owned, field).data());
+  };
+  vector("velocity", state.u);
+  vector("velocity_old", state.u_old);
+  file.add("pressure", cell_shape(index, 1), cell_slab(index, 1), box_values(index, owned, state.p).data());
+  file.add("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1),
+           box_integers(index, owned, state.kind_at_setup).data());
+  for (int d = 0; d < 3; ++d) {
+    const CellBox faces = face_range(index, d);
+    file.add(flux_name(d), face_shape(index, d), face_slab(index, d), box_values(index, faces, state.flux[d]).data());
+    if (state.flux_old[d].data())
+      file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d),
+               box_values(index, faces, state.flux_old[d]).data());
+  }
+  const double numbers[2] = {state.reference_speed, progress.relaxation};
+  file.add("numbers", {2}, numbers);
+  const std::int64_t counts[3] = {state.history_levels, state.iterations_after_setup, state.last_iterations};
+  file.add("counts", {3}, counts);
+  if (simulation.membranes()) {
+    const auto membranes = simulation.membranes()->state();
+    file.add("membranes", {membranes.size()}, membranes.data());
+  }
+  if (simulation.immersed()) {
+    const auto places = simulation.immersed()->boundary().location_state();
+    file.add("locations", {places.size()}, places.data());
+  }
+  file.commit();
+}
+
+void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
+  const IndexSpace& index = simulation.grid().index();
+  const CheckpointReader file(path);
+  file.require_grid({index.global[0], index.global[1], index.global[2]});
+  FluidSolver& fluid = simulation.fluid();
+  auto state = fluid.state().copy();
+  const CellBox owned = owned_box(index);
+  const auto vector = [&](const char* name, const Components<double>& field) {
+    std::vector<double> values(3 * owned.size());
+    file.read(name, cell_shape(index, 3), cell_slab(index, 3), values.data());
+    set_interleaved(index, owned, values, field);
+  };
+  vector("velocity", state.u);
+  vector("velocity_old", state.u_old);
+  std::vector<double> values(owned.size());
+  file.read("pressure", cell_shape(index, 1), cell_slab(index, 1), values.data());
+  set_box_values(index, owned, values, state.p);
+  std::vector<std::int64_t> kinds(owned.size());
+  file.read("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1), kinds.data());
+  Kokkos::deep_copy(state.kind_at_setup, simulation.grid().views().base_kind);
+  set_box_integers(index, owned, kinds, state.kind_at_setup);
+  for (int d = 0; d < 3; ++d) {
+    // Each rank also reads the faces on its upper side, which another rank wrote.
+    CellBox faces = owned;
+    faces.upper[d] += 1;
+    Slab slab = cell_slab(index, 1);
+    slab.count[2 - d] += 1;
+    std::vector<double> flux(faces.size());
+    file.read(flux_name(d), face_shape(index, d), slab, flux.data());
+    set_box_values(index, faces, flux, state.flux[d]);
+    if (state.flux_old[d].data() && file.has(old_flux_name(d))) {
+      file.read(old_flux_name(d), face_shape(index, d), slab, flux.data());
+      set_box_values(index, faces, flux, state.flux_old[d]);
+    }
+  }
+  double numbers[2];
+  file.read("numbers", {2}, numbers);
+  std::int64_t counts[3];
+  file.read("counts", {3}, counts);
+  state.reference_speed = numbers[0];
+  state.history_levels = static_cast<int>(counts[0]);
+  state.iterations_after_setup = static_cast<int>(counts[1]);
+  state.last_iterations = static_cast<int>(counts[2]);
+  if (simulation.membranes()) {
+    std::vector<double> membranes(simulation.membranes()->state().size());
+    file.read("membranes", {membranes.size()}, membranes.data());
+    simulation.membranes()->set_state(membranes);
+  }
+  if (simulation.immersed()) {
+    std::vector<double> places(simulation.immersed()->boundary().location_state().size());
+    file.read("locations", {places.size()}, places.data());
+    simulation.immersed()->boundary().set_location_state(places);
+  }
+  fluid.boundaries().set_time(file.header().time_us);
+  fluid.restore(state);
+  simulation.resume({file.header().time_us, numbers[1], file.header().step});
+}
+
+}  // namespace corpuscle
+
+#endif

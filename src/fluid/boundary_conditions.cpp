@@ -1,0 +1,232 @@
+#include "fluid/boundary_conditions.hpp"
+
+#include "core/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+using Type = BoundarySettings::Type;
+
+int fill_order(Type type) {
+  switch (type) {
+    case Type::outflow: return 0;
+    case Type::symmetry: return 1;
+    case Type::velocity_inlet: return 2;
+    default: return 3;
+  }
+}
+
+double interpolate(const std::vector<std::array<double, 2>>& table, double at) {
+  if (at <= table.front()[0]) return table.front()[1];
+  for (std::size_t i = 1; i < table.size(); ++i)
+    if (at <= table[i][0]) {
+      const double s = (at - table[i - 1][0]) / (table[i][0] - table[i - 1][0]);
+      return table[i - 1][1] + s * (table[i][1] - table[i - 1][1]);
+    }
+  return table.back()[1];
+}
+
+/// Velocity profile over a side, before it is scaled to the wanted mean: 1 on average is not needed here.
+double shape_factor(const BoundarySettings& s, const GridSettings* grid, const IndexSpace& index, const Triple& x,
+                    const Triple& centre, double radius, int d) {
+  if (s.profile == BoundarySettings::Profile::uniform) return 1;
+  if (s.profile == BoundarySettings::Profile::parabolic && grid && grid->generator == GridSettings::Generator::box) {
+    double factor = 1;
+    for (int e = 0; e < 3; ++e) {
+      if (e == d || index.periodic[e]) continue;
+      const double half = 0.5 * (grid->upper_um[e] - grid->lower_um[e]);
+      const double from_middle = (x[e] - grid->lower_um[e]) / half - 1;
+      factor *= 1 - from_middle * from_middle;
+    }
+    return factor;
+  }
+  double square = 0;
+  for (int e = 0; e < 3; ++e) square += (x[e] - centre[e]) * (x[e] - centre[e]);
+  const double r = std::sqrt(square) / radius;
+  if (s.profile == BoundarySettings::Profile::table) return interpolate(s.radial_table, r);
+  return std::max(0.0, 1 - r * r);
+}
+
+}  // namespace
+
+BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySettings>& settings,
+                                       const GridSettings* shape)
+    : grid_(&grid), outflow_("corpuscle::fluid::outflow_mask", grid.index().size()) {
+  const IndexSpace& index = grid.index();
+  for (const auto& s : settings) {
+    if (s.type == Type::periodic) continue;
+    Side side;
+    side.settings = s;
+    side.d = static_cast<int>(s.side) / 2;
+    side.end = static_cast<int>(s.side) % 2;
+    side.here = grid.halo().neighbour(side.d, side.end) < 0;
+    for (int e = 0; e < 3; ++e) {
+      side.box.lower[e] = grid.halo().neighbour(e, 0) < 0 ? -1 : -IndexSpace::halo;
+      side.box.upper[e] = index.n[e] + (grid.halo().neighbour(e, 1) < 0 ? 1 : IndexSpace::halo);
+    }
+    side.box.lower[side.d] = side.end == 0 ? -1 : index.n[side.d];
+    side.box.upper[side.d] = side.box.lower[side.d] + 1;
+    side.inward = side.end == 0 ? index.stride(side.d) : -index.stride(side.d);
+    side.to_face = side.end == 0 ? index.stride(side.d) : 0;
+    side.faces = {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
+    side.faces.lower[side.d] = side.end == 0 ? 0 : index.n[side.d];
+    side.faces.upper[side.d] = side.faces.lower[side.d] + 1;
+    sides_.push_back(side);
+    prescribed_ = prescribed_ || s.type == Type::velocity_inlet || s.type == Type::moving_wall;
+    has_outflow_ = has_outflow_ || s.type == Type::outflow;
+  }
+  std::stable_sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
+    return fill_order(a.settings.type) < fill_order(b.settings.type);
+  });
+  if (prescribed_) {
+    profile_ = Components<double>("corpuscle::fluid::boundary_profile", index.size(), 3);
+    given_ = Components<double>("corpuscle::fluid::boundary_velocity", index.size(), 3);
+  }
+  for (const auto& side : sides_) {
+    if (side.settings.type == Type::velocity_inlet || side.settings.type == Type::moving_wall) set_profile(side, shape);
+    if (side.settings.type == Type::outflow && side.here) {
+      // Edges belong to the neighbouring sides: only faces of the outflow itself carry a pressure.
+      CellBox faces = side.box;
+      for (int e = 0; e < 3; ++e) {
+        if (e == side.d) continue;
+        if (grid.halo().neighbour(e, 0) < 0) faces.lower[e] = 0;
+        if (grid.halo().neighbour(e, 1) < 0) faces.upper[e] = index.n[e];
+      }
+      mark_box(index, faces, outflow_);
+    }
+  }
+  set_time(0);
+}
+
+void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape) {
+  const IndexSpace& index = grid_->index();
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_->views().x);
+  const auto area = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_->views().face_area[side.d]);
+  const auto visit = [&](bool with_edges, const auto& body) {
+    if (!side.here) return;
+    CellBox box = side.box;
+    if (!with_edges)
+      for (int e = 0; e < 3; ++e)
+        if (e != side.d) box.lower[e] = 0, box.upper[e] = index.n[e];
+    for (int k = box.lower[2]; k < box.upper[2]; ++k)
+      for (int j = box.lower[1]; j < box.upper[1]; ++j)
+        for (int i = box.lower[0]; i < box.upper[0]; ++i) body(index.cell(i, j, k));
+  };
+  const auto point = [&](int c) { return Triple{x(c, 0), x(c, 1), x(c, 2)}; };
+  const double inward = side.end == 0 ? 1.0 : -1.0;
+
+  double sums[7] = {0, 0, 0, 0, 0, 0, 0};  // area vector, area, area times centre
+  visit(false, [&](int c) {
+    double s[3], square = 0;
+    for (int m = 0; m < 3; ++m) s[m] = inward * area(c + side.to_face, m), square += s[m] * s[m];
+    for (int m = 0; m < 3; ++m) sums[m] += s[m], sums[4 + m] += std::sqrt(square) * x(c, m);
+    sums[3] += std::sqrt(square);
+  });
+  grid_->comm().sum(sums, 7);
+  const Triple centre{sums[4] / sums[3], sums[5] / sums[3], sums[6] / sums[3]};
+  const double flat = std::sqrt(sums[0] * sums[0] + sums[1] * sums[1] + sums[2] * sums[2]);
+  double radius = 0;
+  visit(true, [&](int c) {
+    double square = 0;
+    for (int m = 0; m < 3; ++m) square += (x(c, m) - centre[m]) * (x(c, m) - centre[m]);
+    radius = std::max(radius, std::sqrt(square));
+  });
+  radius = grid_->comm().max(radius);
+
+  Triple direction{sums[0] / flat, sums[1] / flat, sums[2] / flat};
+  double scale = side.settings.speed;
+  const bool fixed = side.settings.velocity.has_value();
+  if (fixed) {
+    direction = *side.settings.velocity;
+    scale = 1;
+  } else {
+    double flux = 0;  // of the profile with unit speed
+    visit(false, [&](int c) {
+      for (int m = 0; m < 3; ++m)
+        flux += shape_factor(side.settings, shape, index, point(c), centre, radius, side.d) * direction[m] * inward *
+                area(c + side.to_face, m);
+    });
+    flux = grid_->comm().sum(flux);
+    if (!(flux > 0))
+      throw InputError("boundary: the inlet profile carries no flow; check radial_table");
+    scale *= flat / flux;
+  }
+  auto profile = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), profile_);
+  double largest = 0;
+  visit(true, [&](int c) {
+    const double factor = scale * (fixed ? 1 : shape_factor(side.settings, shape, index, point(c), centre, radius, side.d));
+    for (int m = 0; m < 3; ++m) profile(c, m) = factor * direction[m];
+    largest = std::max(largest, std::hypot(profile(c, 0), profile(c, 1), profile(c, 2)));
+  });
+  Kokkos::deep_copy(profile_, profile);
+  double strongest = 1;
+  for (const auto& row : side.settings.time_table) strongest = std::max(strongest, std::abs(row[1]));
+  largest_speed_ = std::max(largest_speed_, strongest * grid_->comm().max(largest));
+}
+
+double BoundaryConditions::time_factor(const BoundarySettings& s, double t) const {
+  const double ramp = s.ramp_us > 0 ? std::clamp(t / s.ramp_us, 0.0, 1.0) : 1.0;
+  return ramp * (s.time_table.empty() ? 1.0 : interpolate(s.time_table, t));
+}
+
+void BoundaryConditions::set_time(double t) {
+  for (const auto& side : sides_) {
+    const Type type = side.settings.type;
+    if (side.here && (type == Type::velocity_inlet || type == Type::moving_wall))
+      scale_profile(grid_->index(), side.box, profile_, time_factor(side.settings, t), given_);
+  }
+}
+
+void BoundaryConditions::fill_sides(const Components<double>& u, bool homogeneous) const {
+  const IndexSpace& index = grid_->index();
+  for (const auto& side : sides_) {
+    if (!side.here) continue;
+    switch (side.settings.type) {
+      case Type::outflow: fill_outflow(index, side.box, side.inward, u); break;
+      case Type::symmetry:
+        fill_symmetry(index, side.box, side.inward, side.to_face, grid_->views().face_area[side.d], u);
+        break;
+      case Type::wall: fill_zero(index, side.box, u); break;
+      default:
+        if (homogeneous)
+          fill_zero(index, side.box, u);
+        else
+          fill_given(index, side.box, given_, u);
+    }
+  }
+}
+
+double BoundaryConditions::balance(const Array<double> (&flux)[3], double growth) const {
+  if (has_outflow_ || !prescribed_) return 0;
+  double sums[2] = {0, 0};
+  const auto visit = [&](const auto& body) {
+    for (const auto& side : sides_)
+      if (side.here && (side.settings.type == Type::velocity_inlet || side.settings.type == Type::moving_wall))
+        body(side, side.end == 0 ? -1.0 : 1.0, grid_->views().face_area[side.d], flux[side.d]);
+  };
+  visit([&](const Side& side, double outward, const Components<double>& area, const Array<double>& f) {
+    const auto part = side_flux(grid_->index(), side.faces, outward, area, f);
+    sums[0] += part.flux, sums[1] += part.area;
+  });
+  grid_->comm().sum(sums, 2);
+  const double per_area = (growth - sums[0]) / sums[1];
+  visit([&](const Side& side, double outward, const Components<double>& area, const Array<double>& f) {
+    spread_flux(grid_->index(), side.faces, outward * per_area, area, f);
+  });
+  return std::abs(per_area);
+}
+
+bool BoundaryConditions::is_wall(int number) const {
+  for (const auto& side : sides_)
+    if (static_cast<int>(side.settings.side) == number)
+      return side.settings.type == Type::wall || side.settings.type == Type::moving_wall;
+  return false;
+}
+
+}  // namespace corpuscle

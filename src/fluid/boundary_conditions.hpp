@@ -1,0 +1,58 @@
+// The six sides of the block: which condition holds where, and the velocities prescribed there.
+#pragma once
+
+#include "fluid/boundary.hpp"
+#include "fluid/masked_gradient.hpp"
+#include "grid/grid.hpp"
+
+namespace corpuscle {
+
+class BoundaryConditions {
+ public:
+  /// @param settings  one entry per side (periodic sides included); the reader has checked that none is missing
+  BoundaryConditions(Grid& grid, const std::vector<BoundarySettings>& settings, const GridSettings* shape);
+
+  /// Prescribed velocities at time t, us.
+  void set_time(double t);
+  /// Fill the boundary layer of u, halos included, from its fluid cells (whose halos are up to date).
+  void fill(const Components<double>& u) const { fill_sides(u, false); }
+  /// The same with all prescribed velocities zero: the boundary's part of the linear operator.
+  void fill_homogeneous(const Components<double>& u) const { fill_sides(u, true); }
+
+  /// Without an outflow the prescribed velocities must carry exactly `growth` (um3/us, of the bodies inside) out of the
+  /// block. Spreads what is missing evenly over the prescribed sides and returns it over their area, um/us.
+  double balance(const Array<double> (&flux)[3], double growth) const;
+
+  /// [cell] 1 at boundary nodes of outflow sides, where pressure is given.
+  const PressureMask& outflow() const { return outflow_; }
+  bool has_outflow() const { return has_outflow_; }
+  /// Largest prescribed speed at any time, um/us.
+  double largest_speed() const { return largest_speed_; }
+  /// Prescribed velocity at boundary nodes, [cell, 3] um/us; allocated only if some side prescribes one.
+  const Components<double>& given() const { return given_; }
+  /// Whether cells beside this side are bounded by a wall (for the immersed boundary's wall guard).
+  bool is_wall(int side) const;
+
+ private:
+  struct Side {
+    BoundarySettings settings;
+    int d = 0, end = 0;  // direction, and 0 for its low end or 1 for its high end
+    bool here = false;   // this rank touches it
+    CellBox box;         // boundary nodes, halo included
+    int inward = 0;      // padded offset from a boundary node to the cell beside it
+    int to_face = 0;     // padded offset from a boundary node to the index of its face
+    CellBox faces;       // owned faces of the side
+  };
+  void set_profile(const Side& side, const GridSettings* shape);
+  void fill_sides(const Components<double>& u, bool homogeneous) const;
+  double time_factor(const BoundarySettings& settings, double t) const;
+
+  Grid* grid_;
+  std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges
+  PressureMask outflow_;
+  Components<double> profile_, given_;
+  bool has_outflow_ = false, prescribed_ = false;
+  double largest_speed_ = 0;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,403 @@
+#include "fluid/fluid_solver.hpp"
+
+#include "core/error.hpp"
+#include "fluid/embedded_rows.hpp"
+#include "fluid/flux.hpp"
+#include "fluid/integrals.hpp"
+
+#include <fmt/format.h>
+
+#include <KokkosBlas1_nrm2_squared.hpp>
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
+
+/// The lowest-numbered fluid cell of the whole grid, as a padded number on the rank that owns it and -1 elsewhere.
+int cell_to_pin(Grid& grid, const Array<NodeKind>& kind) {
+  const int first = first_fluid_cell(grid.index(), kind);
+  const double mine = first >= 0 ? grid.comm().rank() : grid.comm().size();
+  return grid.comm().min(mine) == mine && first >= 0 ? first : -1;
+}
+
+}  // namespace
+
+FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::vector<BoundarySettings>& boundaries,
+                         const GridSettings* shape, Timers* timers)
+    : grid_(&grid),
+      timers_(timers ? timers : &own_timers_),
+      settings_(settings),
+      boundaries_(grid, boundaries, shape),
+      mu_(settings.density_pg_per_um3 * settings.kinematic_viscosity_um2_per_us),
+      imposed_gradient_(1e-3 * to_vec3(settings.pressure_gradient_Pa_per_um)),
+      skewed_(!grid.orthogonal()),
+      krylov_(grid.comm(), 3 * grid.index().owned(), "corpuscle::fluid::krylov"),
+      pressure_solver_(grid, skewed_, settings.max_iterations) {
+  const int n = grid.index().size(), owned = grid.index().owned();
+  for (auto* field : {&u_, &u_old_, &u_older_, &work_, &history_, &grad_p_})
+    *field = Components<double>("corpuscle::fluid::velocity", n, 3);
+  for (auto* field : {&p_, &p_old_, &psi_field_, &diagonal_}) *field = Array<double>("corpuscle::fluid::scalar", n);
+  const bool convective = settings_.convection != FluidSettings::Convection::none;
+  for (int d = 0; d < 3; ++d) {
+    flux_[d] = Array<double>("corpuscle::fluid::flux", n);
+    if (convective) {
+      flux_old_[d] = Array<double>("corpuscle::fluid::flux_old", n);
+      flux_extrapolated_[d] = Array<double>("corpuscle::fluid::flux_extrapolated", n);
+    }
+    g_.normal[d] = Array<double>("corpuscle::fluid::coefficient", n);
+    for (int e = 0; e < 3 && skewed_; ++e)
+      if (e != d) g_.cross[d][e] = Array<double>("corpuscle::fluid::cross_coefficient", n);
+  }
+  for (auto* v : {&residual_, &change_, &scratch_}) *v = Array<double>("corpuscle::fluid::vector", 3 * owned);
+  for (auto* v : {&negative_divergence_, &psi_}) *v = Array<double>("corpuscle::fluid::scalar_vector", owned);
+  kind_ = grid.views().base_kind;
+  kind_at_setup_ = Array<NodeKind>(uninitialised("corpuscle::fluid::kind_at_setup"), n);
+  Kokkos::deep_copy(kind_at_setup_, grid.views().base_kind);
+  mask_ = PressureMask("corpuscle::fluid::pressure_mask", n);
+  statistics_.reference_speed = boundaries_.largest_speed();
+  if (skewed_)
+    viscous_coefficients<true>(grid.views(), g_);
+  else
+    viscous_coefficients<false>(grid.views(), g_);
+  fill_matrix(kind_);
+}
+
+void FluidSolver::fill_matrix(const Array<NodeKind>& kind) {
+  mark_pressure(kind, boundaries_.outflow(), mask_);
+  if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind);
+  if (skewed_)
+    pressure_rows<true>(grid_->views(), g_.normal, kind, mask_, pressure_solver_.pattern(), pinned_,
+                        pressure_solver_.values());
+  else
+    pressure_rows<false>(grid_->views(), g_.normal, kind, mask_, pressure_solver_.pattern(), pinned_,
+                         pressure_solver_.values());
+  pressure_solver_.set_values();
+}
+
+/// The preconditioner is set up, when it is due, before the first solve with the new matrix: both then belong to the
+/// same node kinds, which is all a restart has to remember.
+void FluidSolver::update_matrix() {
+  fill_matrix(kind_);
+  if (!pressure_solver_.setup_is_due()) return;
+  pressure_solver_.set_up();
+  Kokkos::deep_copy(kind_at_setup_, kind_);
+}
+
+void FluidSolver::set_kinds(const Array<NodeKind>& kind) {
+  kind_ = kind;
+  update_matrix();
+}
+
+void FluidSolver::set_body_force(const Components<double>& force, std::function<void(double)> update) {
+  body_force_ = force;
+  update_force_ = std::move(update);
+}
+
+void FluidSolver::fill_halos(const Components<double>& u) {
+  grid_->halo().exchange(u);
+  boundaries_.fill(u);
+}
+
+void FluidSolver::begin_step(double dt) {
+  const auto scope = timers_->scope("momentum");
+  const double rho = settings_.density_pg_per_um3;
+  std::swap(u_older_, u_old_);
+  std::swap(u_old_, u_);
+  Kokkos::deep_copy(p_old_, p_);
+  const bool second_order = history_levels_ >= 1;
+  mass_ = rho * (second_order ? 1.5 : 1.0) / dt;
+  mass1_ = rho * (second_order ? 2.0 : 1.0) / dt;
+  mass2_ = rho * (second_order ? -0.5 : 0.0) / dt;
+  momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
+  // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
+  if (second_order)
+    extrapolate(u_old_, u_older_, u_);
+  else
+    Kokkos::deep_copy(u_, u_old_);
+  if (settings_.convection != FluidSettings::Convection::none) {
+    for (int d = 0; d < 3; ++d) {
+      if (second_order)
+        extrapolate(flux_[d], flux_old_[d], flux_extrapolated_[d]);
+      else
+        Kokkos::deep_copy(flux_extrapolated_[d], flux_[d]);
+      std::swap(flux_[d], flux_old_[d]);
+    }
+    if (settings_.convection == FluidSettings::Convection::extrapolated) Kokkos::deep_copy(work_, u_);
+  }
+  ++history_levels_;
+  statistics_ = {0, 0, 0, 0, statistics_.reference_speed, 0, 0};
+}
+
+void FluidSolver::abandon_step() {
+  std::swap(u_, u_old_);
+  std::swap(u_old_, u_older_);
+  Kokkos::deep_copy(p_, p_old_);
+  if (settings_.convection != FluidSettings::Convection::none)
+    for (int d = 0; d < 3; ++d) std::swap(flux_[d], flux_old_[d]);
+  --history_levels_;
+}
+
+void FluidSolver::assemble_history(double time) {
+  boundaries_.set_time(time);
+  if (update_force_) update_force_(time);
+  momentum_history(grid_->views(), mass1_, mass2_, u_old_, u_older_, -imposed_gradient_, history_);
+  if (body_force_.data()) add_body_force(grid_->views(), body_force_, history_);
+  if (settings_.convection == FluidSettings::Convection::extrapolated && history_levels_ > 0) {
+    if (history_levels_ > 1)
+      extrapolate(u_old_, u_older_, work_);
+    else
+      Kokkos::deep_copy(work_, u_old_);
+    subtract_convection(grid_->views(), kind_, settings_.density_pg_per_um3, flux_extrapolated_, work_, history_);
+  }
+}
+
+void FluidSolver::apply_to_field(const EmbeddedBodies* bodies, const Components<double>& u, const Array<double>& out) {
+  const double rho = settings_.density_pg_per_um3;
+  const bool implicit = settings_.convection == FluidSettings::Convection::implicit;
+  const auto& f = implicit ? flux_extrapolated_ : flux_;
+  if (skewed_ && implicit)
+    apply_momentum<true, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  else if (skewed_)
+    apply_momentum<true, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  else if (implicit)
+    apply_momentum<false, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  else
+    apply_momentum<false, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  if (bodies) apply_embedded_rows(grid_->index(), *bodies, u, out);
+}
+
+template <class Vector>
+void FluidSolver::apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out) {
+  field_from_compact(grid_->index(), v, work_);
+  grid_->halo().exchange(work_);
+  boundaries_.fill_homogeneous(work_);
+  apply_to_field(bodies, work_, out);
+}
+
+double FluidSolver::momentum_residual(const EmbeddedBodies* bodies) {
+  const auto scope = timers_->scope("momentum");
+  grid_->halo().exchange(p_);
+  pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_);
+  momentum_rhs(grid_->views(), kind_, diagonal_, history_, grad_p_, u_, residual_);
+  if (bodies) embedded_rhs(grid_->index(), *bodies, residual_);
+  apply_to_field(bodies, u_, scratch_);
+  KokkosBlas::axpy(-1.0, scratch_, residual_);
+  compact_from_field(grid_->index(), u_, scratch_);
+  double squares[2] = {KokkosBlas::nrm2_squared(residual_), KokkosBlas::nrm2_squared(scratch_)};
+  grid_->comm().sum(squares, 2);
+  const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
+  return std::sqrt(squares[0] / std::max(squares[1], floor));
+}
+
+void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, int pass) {
+  const auto scope = timers_->scope("momentum");
+  const double norm = std::sqrt(grid_->comm().sum(KokkosBlas::nrm2_squared(residual_)));
+  const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
+  // Within the iterated projection a pass gains about a factor of 5: solving its momentum further is wasted.
+  const double inner = iterated && pass > 0 ? 0.05 : 0.0;
+  const double relative = residual > 0 ? settings_.momentum_tolerance / residual : 1.0;
+  const auto result = krylov_.solve(
+      [&](const Array<double>& x, const Array<double>& y) { apply(bodies, x, y); }, residual_, change_,
+      norm * std::max(relative, inner), settings_.max_iterations);
+  statistics_.momentum_iterations += result.iterations;
+  if (!result.converged)
+    throw ComputationError(fmt::format(
+        "velocity: the momentum equation did not converge in {} iterations (residual {:.3g} of the velocity, wanted "
+        "{:.3g}). Likely cause: a step too long for the flow or a diverging run; reduce time.step_us or raise "
+        "fluid.max_iterations",
+        result.iterations, norm > 0 ? result.residual / norm * residual : result.residual,
+        settings_.momentum_tolerance));
+  add_vector(grid_->index(), change_, u_);
+  fill_halos(u_);
+}
+
+void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
+  if (skewed_)
+    interpolate_flux<true>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
+  else
+    interpolate_flux<false>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
+  const double speed = std::max(statistics_.reference_speed, 1e-30);
+  if (!bodies || bodies->bodies == 0) {
+    statistics_.flux_correction = std::max(statistics_.flux_correction, boundaries_.balance(flux_, 0) / speed);
+    return;
+  }
+  if (static_cast<int>(body_sums_.extent(0)) != bodies->bodies)
+    body_sums_ = Table<double>("corpuscle::immersed::body_sums", bodies->bodies, 2);
+  body_flux_sums(grid_->views(), *bodies, flux_, body_sums_);
+  auto host = Kokkos::create_mirror_view(body_sums_);
+  Kokkos::deep_copy(host, body_sums_);
+  grid_->comm().sum(host.data(), 2 * bodies->bodies);
+  Kokkos::deep_copy(body_sums_, host);
+  correct_body_flux(grid_->views(), *bodies, body_sums_, flux_);
+  auto growth = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), bodies->growth);
+  double total_growth = 0;
+  for (int b = 0; b < bodies->bodies; ++b) {
+    total_growth += growth(b);
+    if (host(b, 1) > 0)
+      statistics_.flux_correction =
+          std::max(statistics_.flux_correction, std::abs(growth(b) - host(b, 0)) / (host(b, 1) * speed));
+  }
+  statistics_.flux_correction =
+      std::max(statistics_.flux_correction, boundaries_.balance(flux_, total_growth) / speed);
+}
+
+void FluidSolver::project(const EmbeddedBodies* bodies) {
+  const auto scope = timers_->scope("pressure");
+  make_flux(bodies);
+  negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
+  const double spacing = grid_->mean_spacing();
+  const double target = settings_.divergence_tolerance * statistics_.reference_speed * spacing * spacing;
+  Kokkos::deep_copy(psi_, 0.0);
+  if (pressure_solver_.setup_is_due()) update_matrix();
+  const auto result = pressure_solver_.solve(negative_divergence_, psi_, target);
+  statistics_.pressure_iterations += result.iterations;
+  if (!result.converged)
+    throw ComputationError(fmt::format(
+        "pressure: the projection did not reach a divergence of {:.3g} um3/us in {} iterations. Likely cause: a "
+        "pocket of fluid closed in by a body or prescribed velocities that do not conserve volume; check the "
+        "boundaries, refine the grid, or raise fluid.max_iterations or fluid.divergence_tolerance",
+        target, result.iterations));
+  scalar_from_compact(grid_->index(), psi_, psi_field_);
+  grid_->halo().exchange(psi_field_);
+  if (skewed_)
+    correct_flux<true>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
+  else
+    correct_flux<false>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
+  correct_velocity(grid_->views(), kind_, mask_, psi_field_, u_);
+  update_pressure(grid_->views(), kind_, mass_, mu_, psi_field_, negative_divergence_, p_);
+  if (bodies) {
+    grid_->halo().exchange(u_);
+    boundaries_.fill(u_);
+    apply_velocity_rows(bodies->velocity, bodies->rows, bodies->u_surface, u_);
+  }
+  fill_halos(u_);
+}
+
+void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
+  assemble_history(time);
+  if (bodies) apply_velocity_rows(bodies->velocity, bodies->rows, bodies->u_surface, u_);
+  fill_halos(u_);
+  const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
+  const int most = iterated ? settings_.projection_max_iterations : 1;
+  for (int pass = 0; pass < most; ++pass) {
+    const double residual = momentum_residual(bodies);
+    if (!std::isfinite(residual))
+      throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run; reduce "
+                             "time.step_us");
+    statistics_.splitting = residual;
+    if (pass > 0 && residual < settings_.projection_tolerance) break;
+    solve_momentum(bodies, residual, pass);
+    statistics_.reference_speed =
+        std::max(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
+    project(bodies);
+    ++statistics_.passes;
+  }
+  if (iterated && statistics_.splitting >= settings_.projection_tolerance) {
+    statistics_.splitting = momentum_residual(bodies);
+    if (statistics_.splitting >= settings_.projection_tolerance)
+      throw ComputationError(fmt::format(
+          "velocity and pressure: the iterated projection stopped at {:.3g} after {} passes (wanted {:.3g}); reduce "
+          "time.step_us or raise fluid.projection_max_iterations",
+          statistics_.splitting, most, settings_.projection_tolerance));
+  }
+  grid_->halo().exchange(p_);
+  if (bodies) {
+    apply_pressure_rows(bodies->pressure, bodies->rows, p_);
+    grid_->halo().exchange(p_);
+  }
+  negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
+  statistics_.divergence = grid_->comm().max(largest_magnitude(negative_divergence_));
+}
+
+FluidSolver::State FluidSolver::state() const {
+  State s{u_, u_old_, p_, {}, {}, kind_at_setup_, history_levels_, statistics_.reference_speed};
+  for (int d = 0; d < 3; ++d) s.flux[d] = flux_[d], s.flux_old[d] = flux_old_[d];
+  s.iterations_after_setup = pressure_solver_.iterations_after_setup();
+  s.last_iterations = pressure_solver_.last_iterations();
+  return s;
+}
+
+FluidSolver::State FluidSolver::State::copy() const {
+  State s = *this;
+  const auto clone = [](auto& view) {
+    if (!view.data()) return;
+    auto own = std::remove_reference_t<decltype(view)>(uninitialised(view.label()), view.extent(0), view.extent(1));
+    Kokkos::deep_copy(own, view);
+    view = own;
+  };
+  clone(s.u), clone(s.u_old);
+  const auto clone_scalar = [](auto& view) {
+    if (!view.data()) return;
+    auto own = std::remove_reference_t<decltype(view)>(uninitialised(view.label()), view.extent(0));
+    Kokkos::deep_copy(own, view);
+    view = own;
+  };
+  clone_scalar(s.p), clone_scalar(s.kind_at_setup);
+  for (int d = 0; d < 3; ++d) clone_scalar(s.flux[d]), clone_scalar(s.flux_old[d]);
+  return s;
+}
+
+void FluidSolver::restore(const State& state) {
+  Kokkos::deep_copy(u_, state.u);
+  Kokkos::deep_copy(u_old_, state.u_old);
+  Kokkos::deep_copy(p_, state.p);
+  for (int d = 0; d < 3; ++d) {
+    Kokkos::deep_copy(flux_[d], state.flux[d]);
+    if (flux_old_[d].data() && state.flux_old[d].data()) Kokkos::deep_copy(flux_old_[d], state.flux_old[d]);
+  }
+  history_levels_ = state.history_levels;
+  statistics_.reference_speed = state.reference_speed;
+  grid_->halo().exchange(u_);
+  grid_->halo().exchange(u_old_);
+  grid_->halo().exchange(p_);
+  boundaries_.fill(u_);
+  boundaries_.fill(u_old_);
+  if (!state.kind_at_setup.data()) return;
+  Kokkos::deep_copy(kind_at_setup_, state.kind_at_setup);
+  grid_->halo().exchange(kind_at_setup_);
+  fill_matrix(kind_at_setup_);
+  pressure_solver_.set_up();
+  pressure_solver_.resume(state.iterations_after_setup, state.last_iterations);
+  fill_matrix(kind_);
+}
+
+double FluidSolver::convection_over_viscosity() {
+  const double rho = settings_.density_pg_per_um3;
+  Kokkos::deep_copy(history_, 0.0);
+  subtract_convection(grid_->views(), kind_, rho, flux_, u_, history_);
+  const double convective = grid_->comm().sum(owned_square(grid_->index(), kind_, history_));
+  Kokkos::deep_copy(history_, 0.0);
+  if (skewed_)
+    subtract_viscous<true>(grid_->views(), g_, kind_, mu_, u_, history_);
+  else
+    subtract_viscous<false>(grid_->views(), g_, kind_, mu_, u_, history_);
+  const double viscous = grid_->comm().sum(owned_square(grid_->index(), kind_, history_));
+  return viscous > 0 ? std::sqrt(convective / viscous) : 0;
+}
+
+Triple FluidSolver::mean_velocity() {
+  double sums[3];
+  volume_integral(grid_->views(), kind_, u_, sums);
+  grid_->comm().sum(sums, 3);
+  const double volume = grid_->total_volume();
+  return {sums[0] / volume, sums[1] / volume, sums[2] / volume};
+}
+
+std::vector<Triple> FluidSolver::body_forces(const EmbeddedBodies& bodies) {
+  Table<double> force("corpuscle::immersed::body_force", bodies.bodies, 3);
+  if (skewed_)
+    momentum_balance<true>(grid_->views(), g_, mask_, mu_, u_, p_, bodies, force);
+  else
+    momentum_balance<false>(grid_->views(), g_, mask_, mu_, u_, p_, bodies, force);
+  auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), force);
+  grid_->comm().sum(host.data(), 3 * bodies.bodies);
+  std::vector<Triple> result(bodies.bodies);
+  for (int b = 0; b < bodies.bodies; ++b) result[b] = {host(b, 0), host(b, 1), host(b, 2)};
+  return result;
+}
+
+}  // namespace corpuscle

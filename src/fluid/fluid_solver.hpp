@@ -1,0 +1,130 @@
+// Incompressible Navier-Stokes on one curvilinear block: second-order backward differences in time, viscous terms
+// implicit, rotational incremental fractional step, or that step iterated until no splitting error is left.
+#pragma once
+
+#include "core/timers.hpp"
+#include "fluid/boundary_conditions.hpp"
+#include "fluid/embedded.hpp"
+#include "fluid/momentum.hpp"
+#include "fluid/pressure_solver.hpp"
+
+#include <functional>
+
+namespace corpuscle {
+
+/// What one step needed and how well it did.
+struct FluidStatistics {
+  int momentum_iterations = 0, pressure_iterations = 0, passes = 0;
+  double divergence = 0;       // largest net flux out of a fluid cell, um3/us
+  double reference_speed = 0;  // um/us: the largest prescribed or computed so far
+  double splitting = 0;        // momentum residual that the last projection left, over the velocity (both 2-norms)
+  double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
+};
+
+class FluidSolver {
+ public:
+  /// @param shape   of the built-in grid, for inlet profiles; null for others
+  /// @param timers  where the time of each part is counted; null for nowhere
+  FluidSolver(Grid& grid, const FluidSettings& settings, const std::vector<BoundarySettings>& boundaries,
+              const GridSettings* shape = nullptr, Timers* timers = nullptr);
+
+  /// Start a step: the present solution becomes history.
+  void begin_step(double dt_us);
+  /// Solve for the velocity and pressure at `time_us`; may be called again within the same step with other surface
+  /// velocities, and then starts from the previous answer.
+  /// @throws ComputationError  when a linear solver does not converge or the velocity is not finite
+  void solve(double time_us, const EmbeddedBodies* bodies);
+  /// Undo begin_step: the state before the step is the present one again (its next solve may differ in the last bits).
+  void abandon_step();
+
+  /// Node kinds after bodies have moved; the halo layers must be up to date. Without bodies this is never called.
+  void set_kinds(const Array<NodeKind>& kind);
+
+  Grid& grid() { return *grid_; }
+  BoundaryConditions& boundaries() { return boundaries_; }
+  const FluidSettings& settings() const { return settings_; }
+  const FluidStatistics& statistics() const { return statistics_; }
+  double viscosity() const { return mu_; }
+  /// Velocity scale of tolerances: never below the largest speed seen.
+  void raise_reference_speed(double speed) {
+    if (speed > statistics_.reference_speed) statistics_.reference_speed = speed;
+  }
+  /// Imposed mean pressure gradient, kPa/um.
+  const Vec3& imposed_gradient() const { return imposed_gradient_; }
+  double pressure_setups() const { return pressure_solver_.setups(); }
+
+  /// Velocity [cell, 3] um/us and pressure [cell] kPa with valid halos; node kinds.
+  const Components<double>& velocity() const { return u_; }
+  const Components<double>& old_velocity() const { return u_old_; }
+  const Array<double>& pressure() const { return p_; }
+  const Array<NodeKind>& kind() const { return kind_; }
+  const Array<double> (&flux() const)[3] { return flux_; }
+
+  /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
+  /// solve, to set it and the given boundary velocities. For manufactured solutions and user forces.
+  void set_body_force(const Components<double>& force, std::function<void(double)> update);
+
+  /// rms of the convective term over the rms of the viscous term in the present solution: what leaving it out neglects.
+  double convection_over_viscosity();
+  /// Mean velocity over the whole volume (superficial, bodies count as present), um/us.
+  Triple mean_velocity();
+  /// Force on body `b` from the momentum balance over the faces around it: pressure and viscous stress, nN.
+  std::vector<Triple> body_forces(const EmbeddedBodies& bodies);
+
+  /// What a restart needs for the same bits as without the stop. Views share the solver's memory.
+  struct State {
+    Components<double> u, u_old;
+    Array<double> p;
+    Array<double> flux[3], flux_old[3];   // flux_old only with convection
+    Array<NodeKind> kind_at_setup;        // node kinds when the pressure preconditioner was set up
+    int history_levels = 0;               // how many earlier velocities are valid
+    double reference_speed = 0;
+    int iterations_after_setup = -1, last_iterations = 0;
+    /// The same with memory of its own.
+    State copy() const;
+  };
+  State state() const;
+  /// Continue from a state: fields of owned cells are taken, halos are refilled.
+  void restore(const State& state);
+
+ private:
+  void update_matrix();
+  void fill_matrix(const Array<NodeKind>& kind);
+  void fill_halos(const Components<double>& u);
+  void assemble_history(double time_us);
+  double momentum_residual(const EmbeddedBodies* bodies);
+  void solve_momentum(const EmbeddedBodies* bodies, double residual, int pass);
+  void project(const EmbeddedBodies* bodies);
+  void make_flux(const EmbeddedBodies* bodies);
+  template <class Vector>
+  void apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out);
+  void apply_to_field(const EmbeddedBodies* bodies, const Components<double>& u, const Array<double>& out);
+
+  Grid* grid_;
+  Timers own_timers_;
+  Timers* timers_;
+  FluidSettings settings_;
+  BoundaryConditions boundaries_;
+  double mu_ = 0, mass_ = 0, mass1_ = 0, mass2_ = 0;
+  Vec3 imposed_gradient_;
+  bool skewed_ = false;
+  int history_levels_ = 0;
+  int pinned_ = -1;
+
+  Components<double> u_, u_old_, u_older_, work_, history_, grad_p_;
+  Array<double> p_, p_old_, psi_field_, diagonal_;
+  Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
+  Array<NodeKind> kind_, kind_at_setup_;
+  PressureMask mask_;
+  ViscousCoefficients g_;
+  Array<double> residual_, change_, scratch_;  // compact velocity vectors
+  Array<double> negative_divergence_, psi_;    // compact scalars
+  Table<double> body_sums_;
+  BiCGStab krylov_;
+  PressureSolver pressure_solver_;
+  Components<double> body_force_;
+  std::function<void(double)> update_force_;
+  FluidStatistics statistics_;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,53 @@
+// The pressure equation: flexible GMRES on the true matrix, preconditioned by hypre's BoomerAMG.
+#pragma once
+
+#include "fluid/bicgstab.hpp"
+#include "fluid/pressure_matrix.hpp"
+#include "grid/grid.hpp"
+
+#include <memory>
+
+namespace corpuscle {
+
+/// The matrix keeps its sparsity for the whole run: rows of nodes that are not fluid hold only a diagonal. So a change
+/// of the immersed nodes changes values only, and the preconditioner is set up again only when iterations have grown.
+class PressureSolver {
+ public:
+  PressureSolver(Grid& grid, bool skewed, int max_iterations);
+  ~PressureSolver();
+  PressureSolver(const PressureSolver&) = delete;
+  PressureSolver& operator=(const PressureSolver&) = delete;
+
+  const RowPattern& pattern() const { return pattern_; }
+  /// [row, pattern().count] coefficients; fill it (pressure_rows), then call set_values().
+  const Table<double>& values() const { return value_; }
+  void set_values();
+
+  /// Solve for `x` from the x given until the residual's 2-norm is below `absolute_tolerance`.
+  KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
+
+  /// Whether there is no preconditioner yet, or iterations have grown since the last set-up.
+  bool setup_is_due() const;
+  /// Set the preconditioner up for the matrix as it is now. @pre set_values()
+  void set_up();
+  int setups() const { return setups_; }
+
+  /// Counts on which the next set-up depends, for checkpoints.
+  int iterations_after_setup() const { return iterations_after_setup_; }
+  int last_iterations() const { return last_iterations_; }
+  void resume(int iterations_after_setup, int last_iterations);
+
+ private:
+
+  struct Hypre;
+  std::unique_ptr<Hypre> hypre_;
+  Comm comm_;
+  RowPattern pattern_;
+  Table<double> value_;
+  Table<int> slot_;       // [row, entry] position in the packed arrays, -1 for no entry
+  Array<double> packed_;  // coefficients as hypre takes them
+  Array<int> row_, column_, row_length_;
+  int rows_ = 0, setups_ = 0, iterations_after_setup_ = -1, last_iterations_ = 0;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,320 @@
+#include "immersed/immersed_boundary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "core/error.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+constexpr const char* label_prefix = "corpuscle::immersed::";
+
+template <class View, class... Extents>
+View make(const char* name, Extents... extents) {
+  return View(uninitialised(std::string(label_prefix) + name), extents...);
+}
+
+template <class View>
+auto to_host(const View& view) {
+  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
+}
+
+/// All shifts by -1, 0 or +1 period; the identity first, so that it wins ties.
+Images make_images(const IndexSpace& index, const std::array<Vec3, 3>& period) {
+  Images images;
+  images.count = 0;
+  for (int k = 0; k < 27; ++k) {
+    const int step[3] = {(k % 3 + 1) % 3 - 1, (k / 3 % 3 + 1) % 3 - 1, (k / 9 + 1) % 3 - 1};
+    Vec3 shift;
+    bool allowed = true;
+    for (int d = 0; d < 3; ++d) {
+      allowed = allowed && (step[d] == 0 || index.periodic[d]);
+      shift += static_cast<double>(step[d]) * period[d];
+    }
+    if (allowed) images.shift[images.count++] = shift;
+  }
+  return images;
+}
+
+/// Bounds of the lattice in space, widened by the reach of extrapolation.
+void find_bounds(const Lattice& lattice, LocateOptions& options) {
+  const auto x = to_host(lattice.x);
+  double link = 0;
+  options.lower = {1e300, 1e300, 1e300};
+  options.upper = {-1e300, -1e300, -1e300};
+  for (int k = lattice.lower[2]; k <= lattice.upper[2]; ++k) {
+    for (int j = lattice.lower[1]; j <= lattice.upper[1]; ++j) {
+      for (int i = lattice.lower[0]; i <= lattice.upper[0]; ++i) {
+        const int at[3] = {i, j, k}, c = lattice.node(i, j, k);
+        const Vec3 p = load(x, c);
+        for (int d = 0; d < 3; ++d) {
+          options.lower[d] = std::min(options.lower[d], p[d]);
+          options.upper[d] = std::max(options.upper[d], p[d]);
+          if (at[d] < lattice.upper[d]) link = std::max(link, norm(load(x, c + lattice.index.stride(d)) - p));
+        }
+      }
+    }
+  }
+  const double margin = 0.5 * Lattice::reach * link;
+  options.lower -= {margin, margin, margin};
+  options.upper += {margin, margin, margin};
+}
+
+}  // namespace
+
+ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surface, const ImmersedOptions& options)
+    : grid_(grid), surface_(surface), options_(options), lattice_(make_lattice(grid)) {
+  for (int d = 0; d < 3; ++d) {
+    if (grid.index.periodic[d] && norm(options.period[d]) == 0) {
+      throw InputError(fmt::format("immersed boundary: index direction {} is periodic but its period is zero", d));
+    }
+  }
+  if (options.traction.radius > 2.5) {
+    throw InputError(fmt::format("traction fit: radius {} spacings; allowed up to 2.5, which three halo layers hold",
+                                 options.traction.radius));
+  }
+  images_ = make_images(grid.index, options.period);
+  find_bounds(lattice_, locate_);
+  std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
+  locate_.band_links = options.band_links;
+
+  first_node_ = load(to_host(grid.x), grid.index.cell(0, 0, 0));
+
+  const int cells = grid.index.size(), items = surface.vertices * images_.count;
+  places_ = {make<Table<double>>("vertex_xi", items, 3),
+             make<Array<Located>>("vertex_status", items),
+             make<Table<double>>("vertex_pad", items, 3),
+             make<Array<double>>("vertex_band_width", items),
+             make<Array<int>>("vertex_image", surface.vertices),
+             make<Array<int>>("node_boxes", 6 * (surface.bodies + 1)),
+             make<Array<Key>>("vertex_findings", 3)};
+  normals_ = {make<Components<double>>("face_normal", surface.triangles, 3),
+              make<Components<double>>("angle_normal", surface.vertices, 3)};
+  band_ = {make<Array<Key>>("closest", cells), make<Array<int>>("cut_links", cells),
+           make<Array<double>>("distance", cells), make<Components<double>>("foot", cells, 3)};
+  nodes_ = {make<Array<NodeKind>>("kind", cells), make<Array<int>>("body", cells)};
+  previous_kind_ = make<Array<NodeKind>>("previous_kind", cells);
+  node_counts_ = make<Array<int>>("node_counts", count_slots + 2 * surface.bodies);
+  row_counts_ = make<Array<int>>("row_counts", 2 * row_kinds);
+  traction_counts_ = make<Array<int>>("traction_counts", static_cast<int>(traction_counts));
+  faces_.start = make<Array<int>>("face_start", surface.bodies + 1);
+  tractions_ = {make<Components<double>>("traction", surface.vertices, 3),
+                make<Components<double>>("traction_pressure", surface.vertices, 3),
+                make<Components<double>>("traction_viscous", surface.vertices, 3)};
+  allocate_rows(0);
+  allocate_faces(0);
+
+  Kokkos::deep_copy(nodes_.kind, grid.base_kind);
+  Kokkos::deep_copy(nodes_.body, -1);
+  Kokkos::deep_copy(band_.key, no_key);
+  Kokkos::deep_copy(band_.cut, 0);
+}
+
+void ImmersedBoundary::allocate_rows(int rows) {
+  const auto stencils = [&](const char* name) {
+    const std::string prefix = std::string(name) + "_";
+    return StencilViews{velocity_.node,
+                        make<Table<int>>((prefix + "column").c_str(), rows, stencil_width),
+                        make<Table<double>>((prefix + "weight").c_str(), rows, stencil_width),
+                        make<Array<int>>((prefix + "columns").c_str(), rows),
+                        make<Array<double>>((prefix + "surface_weight").c_str(), rows),
+                        make<Array<RowKind>>((prefix + "kind").c_str(), rows)};
+  };
+  velocity_.node = make<Array<int>>("immersed_node", rows);
+  velocity_ = stencils("velocity_row");
+  pressure_ = stencils("pressure_row");
+  feet_ = {make<Array<int>>("foot_triangle", rows), make<Table<double>>("foot_weight", rows, 3)};
+  u_surface_ = make<Components<double>>("u_surface", rows, 3);
+}
+
+void ImmersedBoundary::allocate_faces(int faces) {
+  faces_.cell = make<Array<int>>("face_cell", faces);
+  faces_.direction = make<Array<std::int8_t>>("face_direction", faces);
+  faces_.sign = make<Array<std::int8_t>>("face_sign", faces);
+  faces_.body = make<Array<int>>("face_body", faces);
+}
+
+NodeBox ImmersedBoundary::read_places() {
+  const auto box = to_host(places_.box);
+  const auto found = to_host(places_.found);
+  counts_.lost_vertex = found(0) == no_key ? -1 : static_cast<int>(found(0));
+  counts_.owned_vertices = static_cast<int>(found(2));
+  counts_.wall_spacings = 1e30;
+  counts_.wall_vertex = -1;
+  if (found(1) != no_key) {
+    const auto bits = static_cast<std::uint32_t>(found(1) >> 32);
+    float spacings = 0;
+    std::memcpy(&spacings, &bits, sizeof spacings);
+    counts_.wall_spacings = spacings;
+    counts_.wall_vertex = static_cast<int>(key_item(found(1)));
+  }
+  NodeBox all;
+  for (int d = 0; d < 3; ++d) {
+    all.lower[d] = box(d);
+    all.upper[d] = box(3 + d);
+  }
+  return all.clipped(lattice_.lower, lattice_.upper);
+}
+
+void ImmersedBoundary::classify() {
+  locate_vertices(lattice_, surface_, images_, locate_, places_);
+  locate_.warm = true;
+  const NodeBox present = read_places(), box = merged(present, last_box_);
+  clear_band(lattice_, box, band_);
+  Kokkos::deep_copy(Exec(), previous_kind_, nodes_.kind);
+  pseudo_normals(surface_, normals_);
+  mark_band(lattice_, surface_, images_, places_, band_);
+  mark_cut_links(lattice_, surface_, images_, places_, band_);
+  measure_band(lattice_, box, surface_, images_, normals_, band_);
+  last_box_ = present;
+  classify_nodes(box);
+
+  if (list_immersed(grid_.index, box, nodes_.kind, velocity_.node) != counts_.immersed ||
+      counts_.immersed > static_cast<int>(velocity_.node.extent(0))) {
+    allocate_rows(counts_.immersed + counts_.immersed / 2);
+    list_immersed(grid_.index, box, nodes_.kind, velocity_.node);
+  }
+  counts_.faces = count_faces(grid_.index, places_.box, surface_.bodies, nodes_, faces_);
+  if (counts_.faces > static_cast<int>(faces_.cell.extent(0))) allocate_faces(counts_.faces + counts_.faces / 2);
+  list_faces(grid_.index, places_.box, surface_.bodies, nodes_, faces_);
+}
+
+void ImmersedBoundary::classify_nodes(const NodeBox& box) {
+  classify_band(grid_, box, surface_, band_, nodes_);
+  NodeBox interior = box;
+  for (int d = 0; d < 3; ++d) {
+    interior.lower[d] = std::max(box.lower[d], lattice_.lower[d] + (lattice_.boundary_below[d] ? 1 : 0));
+    interior.upper[d] = std::min(box.upper[d], lattice_.upper[d] - (lattice_.boundary_above[d] ? 1 : 0));
+  }
+  for (int d = 0; d < 3; ++d) fill_lines(grid_.index, interior, d, nodes_);
+  mark_immersed(lattice_, box, surface_, band_, nodes_);
+  counts_.isolated = absorb_isolated(lattice_, box, surface_, images_, normals_, band_, nodes_);
+  count_nodes(grid_.index, box, band_, nodes_, previous_kind_, node_counts_);
+  read_counts(box);
+}
+
+void ImmersedBoundary::read_counts(const NodeBox& box) {
+  auto counts = to_host(node_counts_);
+  if (counts(count_band) == 0) {
+    const NodeBox all = resolve_enclosed(box);
+    count_nodes(grid_.index, all, band_, nodes_, previous_kind_, node_counts_);
+    Kokkos::deep_copy(counts, node_counts_);
+  }
+  counts_.immersed = counts(count_immersed);
+  counts_.inside = counts(count_inside);
+  counts_.fluid = grid_.index.owned() - counts_.immersed - counts_.inside;
+  counts_.cut_links = counts(count_cut);
+  counts_.uncovered = counts(count_uncovered);
+  counts_.body_immersed.resize(surface_.bodies);
+  counts_.body_inside.resize(surface_.bodies);
+  for (int b = 0; b < surface_.bodies; ++b) {
+    counts_.body_immersed[b] = counts(count_slots + 2 * b);
+    counts_.body_inside[b] = counts(count_slots + 2 * b + 1);
+  }
+}
+
+/// No surface passes through the block: all of it lies outside, or inside one body that encloses it.
+NodeBox ImmersedBoundary::resolve_enclosed(const NodeBox& box) {
+  const Vec3& p = first_node_;
+  if (winding_number(surface_, images_, 0, surface_.triangles, p) < 0.5) {
+    decide_rest(grid_.index, box, NodeKind::fluid, -1, nodes_);
+    return box;
+  }
+  const auto first = to_host(surface_.first_triangle);
+  int body = 0;
+  while (body + 1 < surface_.bodies && winding_number(surface_, images_, first(body), first(body + 1), p) < 0.5) {
+    ++body;
+  }
+  NodeBox all;
+  std::copy(lattice_.lower, lattice_.lower + 3, all.lower);
+  std::copy(lattice_.upper, lattice_.upper + 3, all.upper);
+  classify_band(grid_, all, surface_, band_, nodes_);
+  decide_rest(grid_.index, all, NodeKind::inside, body, nodes_);
+  last_box_ = all;
+  return all;
+}
+
+void ImmersedBoundary::build_stencils() {
+  Kokkos::deep_copy(Exec(), row_counts_, 0);
+  build_velocity_rows(input(), options_.reconstruction, counts_.immersed, velocity_, feet_, row_counts_);
+  build_pressure_rows(input(), options_.pressure_extension, counts_.immersed, pressure_, row_counts_);
+  const auto counts = to_host(row_counts_);
+  for (int k = 0; k < row_kinds; ++k) {
+    counts_.velocity_rows[k] = counts(k);
+    counts_.pressure_rows[k] = counts(row_kinds + k);
+  }
+  update_surface_velocity();
+}
+
+void ImmersedBoundary::update_surface_velocity() {
+  interpolate_surface_velocity(surface_, feet_, counts_.immersed, u_surface_);
+}
+
+void ImmersedBoundary::reconstruct_velocity(const Components<double>& u) const {
+  apply_velocity_rows(velocity_, counts_.immersed, u_surface_, u);
+}
+
+void ImmersedBoundary::extend_pressure(const Array<double>& p) const {
+  apply_pressure_rows(pressure_, counts_.immersed, p);
+}
+
+const TractionOutput& ImmersedBoundary::tractions(const TractionInput& fields) {
+  corpuscle::tractions(input(), places_, fields, options_.traction, tractions_, traction_counts_);
+  return tractions_;
+}
+
+std::vector<int> ImmersedBoundary::traction_fallbacks() const {
+  const auto counts = to_host(traction_counts_);
+  return {counts.data(), counts.data() + counts.extent(0)};
+}
+
+void ImmersedBoundary::loads(const Components<double>& traction, const Components<double>& centre,
+                             const Components<double>& loads) const {
+  body_loads(surface_, traction, centre, loads);
+}
+
+Slip ImmersedBoundary::slip(const Components<double>& u) const {
+  return surface_slip(input(), places_, u, options_.traction);
+}
+
+std::vector<char> ImmersedBoundary::owned_vertices() const {
+  const auto image = to_host(places_.image);
+  std::vector<char> owned(image.extent(0));
+  for (std::size_t v = 0; v < owned.size(); ++v) owned[v] = image(v) >= 0;
+  return owned;
+}
+
+std::vector<double> ImmersedBoundary::location_state() const {
+  const auto xi = to_host(places_.xi);
+  const auto status = to_host(places_.status);
+  std::vector<double> state;
+  for (std::size_t item = 0; item < status.extent(0); ++item) {
+    for (int d = 0; d < 3; ++d) state.push_back(xi(item, d));
+    state.push_back(static_cast<double>(status(item)));
+  }
+  return state;
+}
+
+void ImmersedBoundary::set_location_state(const std::vector<double>& state) {
+  auto xi = to_host(places_.xi);
+  auto status = to_host(places_.status);
+  for (std::size_t item = 0; item < status.extent(0); ++item) {
+    for (int d = 0; d < 3; ++d) xi(item, d) = state[4 * item + d];
+    status(item) = static_cast<Located>(static_cast<int>(state[4 * item + 3]));
+  }
+  Kokkos::deep_copy(places_.xi, xi);
+  Kokkos::deep_copy(places_.status, status);
+  locate_.warm = true;
+}
+
+std::string ImmersedBoundary::describe_vertex(int vertex) const {
+  const Vec3 x = load(to_host(surface_.x), vertex);
+  const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
+  return fmt::format("body {}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body, vertex - first, x.x, x.y, x.z);
+}
+
+}  // namespace corpuscle

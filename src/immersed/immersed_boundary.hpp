@@ -1,0 +1,123 @@
+// The sharp-interface immersed boundary: which nodes are fluid, how the others get their values, and the fluid's
+// traction on the surfaces.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "immersed/classify.hpp"
+#include "immersed/faces.hpp"
+#include "immersed/locate.hpp"
+#include "immersed/traction.hpp"
+
+namespace corpuscle {
+
+struct ImmersedOptions {
+  std::array<bool, 6> wall{};    // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
+  std::array<Vec3, 3> period{};  // shift by one period along each periodic direction, um
+  double band_links = 1.1;       // half-width of the search band in link lengths
+  Reconstruction reconstruction = Reconstruction::quadratic;
+  PressureExtension pressure_extension = PressureExtension::least_squares;
+  TractionOptions traction;
+};
+
+/// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
+struct ImmersedCounts {
+  int fluid = 0, immersed = 0, inside = 0;
+  int cut_links = 0;  // grid links that cross a surface
+  int isolated = 0;   // of the immersed: absorbed because no fluid neighbour was left
+  int uncovered = 0;  // inside at the last classification, fluid now
+  int faces = 0;
+  int owned_vertices = 0;
+  std::vector<int> body_immersed, body_inside;
+  std::array<int, row_kinds> velocity_rows{}, pressure_rows{};  // by RowKind
+  int lost_vertex = -1;         // lowest vertex beyond a physical boundary seen here; -1: none
+  double wall_spacings = 1e30;  // least distance to a wall, in local spacings
+  int wall_vertex = -1;         // the vertex that has it
+};
+
+/// Owns the search band, the classification and the stencils of one rank's block. Nothing here communicates.
+class ImmersedBoundary {
+ public:
+  /// @param surface  shared views: later changes of positions and velocities are seen. Topology is fixed.
+  ImmersedBoundary(const GridViews& grid, const SurfaceSet& surface, const ImmersedOptions& options);
+
+  /// Search, classify, list immersed nodes and faces at the surfaces' present position. Halo nodes are classified too;
+  /// of these the outermost layer may miss links beyond it.
+  void classify();
+  /// Rows for velocity and pressure at the listed nodes. @pre classify()
+  void build_stencils();
+  /// Interpolate the surfaces' present velocities to the rows' surface points. @pre build_stencils()
+  void update_surface_velocity();
+
+  /// u at immersed nodes from the fluid and surface_velocity(); u's halos must be filled.
+  void reconstruct_velocity(const Components<double>& u) const;
+  /// p at immersed nodes from the fluid.
+  void extend_pressure(const Array<double>& p) const;
+
+  /// Traction on the vertices this rank owns, zero on the others: add up over ranks. See TractionInput for units.
+  const TractionOutput& tractions(const TractionInput& fields);
+  /// How the last tractions came about, by TractionFallback; copies to the host.
+  std::vector<int> traction_fallbacks() const;
+  /// Force and torque of each body from tractions that were added up over ranks. centre, loads: [body, 3], [body, 6].
+  void loads(const Components<double>& traction, const Components<double>& centre,
+             const Components<double>& loads) const;
+  Slip slip(const Components<double>& u) const;
+
+  const NodeViews& nodes() const { return nodes_; }
+  const BandViews& band() const { return band_; }
+  const PlaceViews& places() const { return places_; }
+  const Lattice& lattice() const { return lattice_; }
+  const Images& images() const { return images_; }
+  /// The first counts().immersed entries of the views are in use; capacity may be larger.
+  const StencilViews& velocity_stencils() const { return velocity_; }
+  const StencilViews& pressure_stencils() const { return pressure_; }
+  const FootViews& feet() const { return feet_; }
+  const Components<double>& surface_velocity() const { return u_surface_; }
+  /// The first counts().faces entries are in use.
+  const FaceViews& faces() const { return faces_; }
+  const ImmersedCounts& counts() const { return counts_; }
+
+  /// True where this rank owns the vertex; copies to the host. Over all ranks each vertex is owned exactly once, unless
+  /// it left the grid.
+  std::vector<char> owned_vertices() const;
+  /// Where the vertices were found last, from which the next search starts; restoring it makes a restarted run
+  /// repeat the same bits.
+  std::vector<double> location_state() const;
+  void set_location_state(const std::vector<double>& state);
+  /// "body 2, vertex 17 at (x, y, z) um"; copies from the device.
+  std::string describe_vertex(int vertex) const;
+
+ private:
+  StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
+  NodeBox read_places();
+  void classify_nodes(const NodeBox& box);
+  NodeBox resolve_enclosed(const NodeBox& box);
+  void read_counts(const NodeBox& box);
+  void allocate_rows(int rows);
+  void allocate_faces(int faces);
+
+  GridViews grid_;
+  SurfaceSet surface_;
+  ImmersedOptions options_;
+  Lattice lattice_;
+  Images images_;
+  Vec3 first_node_;
+  LocateOptions locate_;
+  PlaceViews places_;
+  PseudoNormals normals_;
+  BandViews band_;
+  NodeViews nodes_;
+  Array<NodeKind> previous_kind_;
+  Array<int> node_counts_, row_counts_, traction_counts_;
+  StencilViews velocity_, pressure_;
+  FootViews feet_;
+  Components<double> u_surface_;
+  FaceViews faces_;
+  TractionOutput tractions_;
+  NodeBox last_box_;
+  ImmersedCounts counts_;
+};
+
+}  // namespace corpuscle

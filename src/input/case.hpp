@@ -1,0 +1,178 @@
+// A scene as the program sees it: every value checked and in internal units (um, us, pg). A section that the case
+// file leaves out is an empty optional or vector here, and the module it stands for is never built.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace corpuscle {
+
+using Triple = std::array<double, 3>;
+
+/// [time]
+struct TimeSettings {
+  double step_us = 1;
+  double end_us = 0;
+
+  bool operator==(const TimeSettings&) const = default;
+};
+
+/// [grid]
+struct GridSettings {
+  enum class Generator { box, straight_tube, swept_tube, file };
+  enum class CrossSection { conformal, elliptical };
+  enum class Centerline { arc, helix, spline };
+
+  Generator generator = Generator::box;
+  std::array<int, 3> nodes{};          // nodes per direction, one more than cells
+  Triple lower_um{}, upper_um{};       // box
+  double diameter_um = 0;              // tubes
+  double length_um = 0;                // straight tube: along z, centred at the origin
+  CrossSection cross_section = CrossSection::conformal;
+  Centerline centerline = Centerline::spline;  // swept tube
+  std::vector<Triple> points_um;       // spline: points the centreline passes through
+  double arc_radius_um = 0, arc_angle_deg = 0;
+  double helix_radius_um = 0, helix_pitch_um = 0, helix_turns = 0;
+  std::string file;                    // HDF5 with data set "nodes" [nk, nj, ni, 3] in um
+
+  bool operator==(const GridSettings&) const = default;
+};
+
+/// [fluid]
+struct FluidSettings {
+  enum class Convection { none, extrapolated, implicit };
+  enum class Projection { fractional_step, iterated };
+
+  double density_pg_per_um3 = 1.0;
+  double kinematic_viscosity_um2_per_us = 1.1;
+  Convection convection = Convection::extrapolated;
+  Projection projection = Projection::fractional_step;
+  double projection_tolerance = 1e-6;   // iterated: velocity change of one pass over the velocity
+  int projection_max_iterations = 30;
+  double momentum_tolerance = 1e-8;     // relative residual
+  double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
+  int max_iterations = 200;             // of either linear solver
+  Triple pressure_gradient_Pa_per_um{}; // imposed on periodic directions, in Pa/um; drives the flow along -gradient
+
+  bool operator==(const FluidSettings&) const = default;
+};
+
+/// [[boundary]]: one per side of the block
+struct BoundarySettings {
+  enum class Side { i_min, i_max, j_min, j_max, k_min, k_max };
+  enum class Type { velocity_inlet, outflow, wall, moving_wall, symmetry, periodic };
+  enum class Profile { uniform, parabolic, table };
+
+  Side side = Side::i_min;
+  Type type = Type::wall;
+  Profile profile = Profile::uniform;
+  double speed = 0;                     // um/us, inlet: mean speed along the inward normal of the side
+  std::optional<Triple> velocity;       // um/us, inlet or moving wall: a fixed vector instead of `speed`
+  std::vector<std::array<double, 2>> radial_table;  // profile = "table": (r / R, speed / mean speed)
+  double ramp_us = 0;                   // linear from rest
+  std::vector<std::array<double, 2>> time_table;    // (us, factor), linear between, constant beyond
+
+  bool operator==(const BoundarySettings&) const = default;
+};
+
+/// [[cells]]
+struct CellSettings {
+  enum class Reference { shape, spontaneous_angle, uniform };
+  enum class Interior { empty, cytosol };
+  enum class Dissipation { central, full };
+
+  int vertices = 500;
+  std::string mesh;                     // OFF or STL file instead of the built-in biconcave shape; "" if none
+  Triple center_um{};
+  Triple axis{0, 0, 1};                 // direction of the cell's symmetry axis
+  double spin_deg = 0;                  // rotation of the mesh about that axis
+  double mass_pg = 100;
+  Reference reference = Reference::shape;
+  Interior interior = Interior::empty;
+  double shear_modulus_uN_per_m = 6.32; // from the springs; sets p l0
+  double bending_modulus_fJ = 2.4e-4;   // kappa; k_b = 2 kappa / sqrt(3)
+  double area_modulus_uN_per_m = 236;   // k_a
+  double local_area_modulus_uN_per_m = 4.82;  // k_d
+  double volume_modulus_Pa = 248;       // k_v
+  double membrane_viscosity_N_s_per_m = 0;
+  Dissipation dissipation = Dissipation::central;
+
+  bool operator==(const CellSettings&) const = default;
+};
+
+/// [[bodies]]: rigid, held or moved as prescribed
+struct BodySettings {
+  enum class Shape { sphere, ellipsoid, file };
+
+  Shape shape = Shape::sphere;
+  int vertices = 0;                     // surface resolution; 0: about one grid spacing an edge
+  double radius_um = 0;
+  Triple semi_axes_um{};
+  std::string file;                     // OFF or STL
+  Triple center_um{};
+  Triple velocity_um_per_us{};
+  Triple angular_velocity_rad_per_us{}; // about center_um
+
+  bool operator==(const BodySettings&) const = default;
+};
+
+/// [coupling]
+struct CouplingSettings {
+  enum class Scheme { robin, aitken, loose };
+
+  Scheme scheme = Scheme::robin;
+  double tolerance = 1e-3;              // aitken: residual over the step's displacement
+  int max_iterations = 50;              // aitken
+  double robin_coefficient = -1;        // beta, pg/um2/us; negative: mu pi / (2 h)
+  bool robin_in_aitken = true;
+
+  bool operator==(const CouplingSettings&) const = default;
+};
+
+/// [stretching]: a cell pulled by two opposite forces, no fluid
+struct StretchingSettings {
+  double force_pN = 200;
+  int steps = 16;
+  double patch_fraction = 0.02;         // share of the vertices at each end that carry the force
+  double tolerance = 1e-4;              // rest: largest residual vertex force over the mean applied vertex force
+  int max_iterations = 200000;          // of the relaxation, each force step
+  std::string experiment;               // CSV to compare with; "" if none
+
+  bool operator==(const StretchingSettings&) const = default;
+};
+
+/// [output]
+struct OutputSettings {
+  double every_us = 0;                  // fields and cells; 0: only the first and last state
+  double history_every_us = 0;          // 0: every step
+  double checkpoint_every_us = 0;       // 0: only at the end
+  bool fields = true;                   // false, or a list in the case file: which are written
+  bool velocity = true, pressure = true, kind = true;
+  bool cells = true;
+
+  bool operator==(const OutputSettings&) const = default;
+};
+
+struct Case {
+  std::string path;                     // of the case file
+  std::string title;
+  std::string resolved;                 // every key with the value used, as TOML; stored with the results
+  TimeSettings time;
+  std::optional<GridSettings> grid;
+  std::optional<FluidSettings> fluid;
+  std::vector<BoundarySettings> boundaries;
+  std::vector<CellSettings> cells;
+  std::vector<BodySettings> bodies;
+  std::optional<CouplingSettings> coupling;
+  std::optional<StretchingSettings> stretching;
+  OutputSettings output;
+};
+
+/// Read and check a case file.
+/// @param overrides  "section.key=value" as given to --set; "cells.0.vertices=1000" addresses the first [[cells]].
+/// @throws InputError  naming file, line, key, value and what is allowed.
+Case read_case(const std::string& path, const std::vector<std::string>& overrides = {});
+
+}  // namespace corpuscle

@@ -1,0 +1,104 @@
+#include "input/case_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace corpuscle {
+namespace {
+
+using Side = BoundarySettings::Side;
+using Type = BoundarySettings::Type;
+
+std::string entry(std::size_t b) { return fmt::format("boundary.{}", b); }
+
+void check_sides_given_once(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
+  for (std::size_t b = 0; b < scene.boundaries.size(); ++b) {
+    const auto side = scene.boundaries[b].side;
+    const int first = entry_of[static_cast<int>(side)];
+    if (first != static_cast<int>(b))
+      complain(entry(b), "side",
+               fmt::format("this side already has a [[boundary]] (boundary.{}); give each side one", first));
+  }
+  std::string missing;
+  for (int s = 0; s < 6; ++s)
+    if (entry_of[s] < 0) missing += (missing.empty() ? "" : ", ") + std::string(name_of(static_cast<Side>(s)));
+  if (!missing.empty())
+    complain("boundary", "", fmt::format("no [[boundary]] for {}; each of the six sides needs one", missing));
+}
+
+void check_tube_sides(const Case& scene, const Complaint& complain) {
+  const auto generator = scene.grid->generator;
+  if (generator != GridSettings::Generator::straight_tube && generator != GridSettings::Generator::swept_tube) return;
+  for (std::size_t b = 0; b < scene.boundaries.size(); ++b) {
+    const auto& boundary = scene.boundaries[b];
+    const bool lateral = boundary.side != Side::k_min && boundary.side != Side::k_max;
+    if (lateral && boundary.type != Type::wall && boundary.type != Type::moving_wall)
+      complain(entry(b), "type", "this side is part of the tube's wall: it must be \"wall\" or \"moving_wall\"");
+  }
+}
+
+}  // namespace
+
+const char* name_of(BoundarySettings::Side side) {
+  static constexpr std::array names{"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"};
+  return names[static_cast<int>(side)];
+}
+
+void check_boundaries(const Case& scene, const Complaint& complain) {
+  std::array<int, 6> entry_of;
+  entry_of.fill(-1);
+  for (std::size_t b = scene.boundaries.size(); b-- > 0;)
+    entry_of[static_cast<int>(scene.boundaries[b].side)] = static_cast<int>(b);
+  check_sides_given_once(scene, entry_of, complain);
+
+  int inlets = 0, outflows = 0, inlet = 0;
+  for (std::size_t b = 0; b < scene.boundaries.size(); ++b) {
+    const auto& boundary = scene.boundaries[b];
+    const auto opposite = static_cast<Side>(static_cast<int>(boundary.side) ^ 1);
+    const auto& partner = scene.boundaries[entry_of[static_cast<int>(opposite)]];
+    if (boundary.type == Type::periodic && partner.type != Type::periodic)
+      complain(entry(b), "type",
+               fmt::format("periodic sides come in pairs: make {} periodic as well", name_of(opposite)));
+    if (boundary.type == Type::velocity_inlet) ++inlets, inlet = static_cast<int>(b);
+    if (boundary.type == Type::outflow) ++outflows;
+  }
+  check_tube_sides(scene, complain);
+  if (inlets == 1 && outflows == 0)
+    complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
+
+  for (int d = 0; d < 3; ++d) {
+    const double gradient = scene.fluid->pressure_gradient_Pa_per_um[d];
+    const bool any_periodic = scene.boundaries[entry_of[0]].type == Type::periodic ||
+                              scene.boundaries[entry_of[2]].type == Type::periodic ||
+                              scene.boundaries[entry_of[4]].type == Type::periodic;
+    if (gradient != 0 && !any_periodic)
+      complain("fluid", "pressure_gradient_Pa_per_um", "an imposed pressure gradient needs a pair of periodic sides");
+  }
+}
+
+void check_modules(const Case& scene, const Complaint& complain) {
+  if (scene.stretching) {
+    for (const auto& [present, name] :
+         std::initializer_list<std::pair<bool, const char*>>{{scene.fluid.has_value(), "fluid"},
+                                                             {scene.grid.has_value(), "grid"},
+                                                             {!scene.boundaries.empty(), "boundary"},
+                                                             {!scene.bodies.empty(), "bodies"},
+                                                             {scene.coupling.has_value(), "coupling"}})
+      if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
+    if (scene.cells.size() != 1)
+      complain("stretching", "",
+               fmt::format("a stretching test pulls one cell; the case has {} [[cells]]", scene.cells.size()));
+    return;
+  }
+  if (!scene.fluid && !scene.bodies.empty()) complain("bodies", "", "rigid bodies need a [fluid]");
+  if (!scene.fluid && !scene.boundaries.empty()) complain("boundary", "", "boundaries need a [fluid]");
+  if (!scene.fluid && scene.grid) complain("grid", "", "a grid without a [fluid] has no use");
+  if (!scene.fluid) complain(scene.cells.empty() ? "" : "cells", "", "nothing to compute: add [fluid] or [stretching]");
+  if (!scene.grid) complain("fluid", "", "a fluid needs a [grid]");
+  if (scene.coupling && scene.cells.empty())
+    complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
+  check_boundaries(scene, complain);
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,155 @@
+// Parses a case file, hands its sections to their readers and checks the whole. flow_sections.cpp and body_sections.cpp
+// read the keys, section.cpp checks types and ranges, case_checks.cpp what spans several sections.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "core/error.hpp"
+#include "core/nearest.hpp"
+#include "input/case_checks.hpp"
+#include "input/overrides.hpp"
+#include "input/sections.hpp"
+
+namespace corpuscle {
+namespace {
+
+// Hands out the sections of one case file and gathers their echo.
+class CaseReader {
+ public:
+  CaseReader(const std::string& path, const std::vector<std::string>& overrides) {
+    source_.file = path;
+    source_.folder = std::filesystem::path(path).parent_path().string();
+    parse(path);
+    source_.overrides = apply_overrides(root_, overrides);
+    check_section_names();
+  }
+
+  Case read() {
+    Case scene;
+    scene.path = source_.file;
+    read_title(scene);
+    if (root_.contains("contact")) complain("contact", "", "contact forces do not exist yet: leave this section out");
+    if (root_.contains("grid")) scene.grid = one<GridSettings>("grid", read_grid);
+    if (root_.contains("fluid")) scene.fluid = one<FluidSettings>("fluid", read_fluid);
+    each("boundary", [&](Section& s) { scene.boundaries.push_back(read_boundary(s)); });
+    const bool placed = scene.fluid.has_value();
+    each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, placed)); });
+    each("bodies", [&](Section& s) { scene.bodies.push_back(read_body(s)); });
+    const bool coupled = scene.fluid && !scene.cells.empty();
+    if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
+    if (root_.contains("stretching")) scene.stretching = one<StretchingSettings>("stretching", read_stretching);
+    check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
+    read_time_section(scene);
+    const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
+    scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
+    scene.resolved = echo_;
+    return scene;
+  }
+
+ private:
+  void parse(const std::string& path) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
+    std::ifstream in(path, std::ios::binary);
+    const std::string text((std::istreambuf_iterator<char>(in)), {});
+    if (!in.is_open() || in.bad())
+      throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+    try {
+      root_ = toml::parse(text, path);
+    } catch (const toml::parse_error& error) {
+      const auto& at = error.source().begin;
+      throw InputError(
+          fmt::format("{}:{}: not valid TOML at column {}: {}", path, at.line, at.column, error.description()));
+    }
+  }
+
+  void check_section_names() const {
+    std::vector<std::string> names{"title"};
+    for (const auto& section : section_names) names.emplace_back(section.name);
+    for (const auto& [key, node] : root_) {
+      const std::string name(key.str());
+      if (name == "title") continue;
+      const bool table = node.is_table() || node.is_array_of_tables();
+      const auto at = fmt::format("{}:{}: {}", source_.file, node.source().begin.line, name);
+      const auto known = std::find_if(std::begin(section_names), std::end(section_names),
+                                      [&](const SectionName& s) { return s.name == name; });
+      if (known == std::end(section_names)) {
+        const auto like = nearest(name, names);
+        throw InputError(fmt::format(
+            "{}{}: unknown {}; {}", at, table ? "" : " = " + toml_text(node),
+            table ? "section" : "key outside any section",
+            like.empty() ? fmt::format("known: {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
+      }
+      if (known->listed && !node.is_array_of_tables())
+        throw InputError(fmt::format("{}: write it as a list entry, [[{}]]", at, name));
+      if (!known->listed && !node.is_table())
+        throw InputError(fmt::format("{}: write it as one section, [{}]", at, name));
+    }
+  }
+
+  void read_title(Case& scene) {
+    if (const auto* title = root_.get("title")) {
+      if (!title->is_string())
+        throw InputError(fmt::format("{}:{}: title = {}: must be a text in quotes", source_.file,
+                                     title->source().begin.line, toml_text(*title)));
+      scene.title = *title->value<std::string>();
+    }
+    echo_ += "title = " + toml_text(scene.title) + "\n";
+  }
+
+  void read_time_section(Case& scene) {
+    if (scene.stretching) {
+      if (root_.contains("time"))
+        complain("time", "", "a stretching test goes from rest to rest and has no [time]: leave this section out");
+      return;
+    }
+    if (!root_.contains("time"))
+      throw InputError(source_.file + ": section [time] is missing; it needs step_us and end_us");
+    scene.time = one<TimeSettings>("time", read_time);
+  }
+
+  template <class Settings, class Read>
+  Settings one(const std::string& name, const Read& read) {
+    const auto* node = root_.get(name);
+    Section section(source_, name, node ? node->as_table() : nullptr);
+    auto settings = read(section);
+    echo_ += fmt::format("\n[{}]\n{}", name, section.echo());
+    return settings;
+  }
+
+  template <class Read>
+  void each(const std::string& name, const Read& read) {
+    const auto* node = root_.get(name);
+    if (!node) return;
+    int number = 0;
+    for (const auto& entry : *node->as_array()) {
+      Section section(source_, fmt::format("{}.{}", name, number++), entry.as_table());
+      read(section);
+      echo_ += fmt::format("\n[[{}]]\n{}", name, section.echo());
+    }
+  }
+
+  // Path of a section as in messages, "cells.1", to its table; the first entry stands for a whole list.
+  [[noreturn]] void complain(const std::string& path, const std::string& key, const std::string& problem) const {
+    const auto dot = path.find('.');
+    const auto* node = root_.get(path.substr(0, dot));
+    if (node && node->is_array())
+      node = node->as_array()->get(dot == std::string::npos ? 0 : std::stoul(path.substr(dot + 1)));
+    Section(source_, path, node ? node->as_table() : nullptr).fail(key, problem);
+  }
+
+  CaseSource source_;
+  toml::table root_;
+  std::string echo_;
+};
+
+}  // namespace
+
+Case read_case(const std::string& path, const std::vector<std::string>& overrides) {
+  return CaseReader(path, overrides).read();
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,22 @@
+// Allocation and filling of the membranes' device arrays.
+#pragma once
+
+#include <vector>
+
+#include "membrane/membrane_views.hpp"
+#include "membrane/motion.hpp"
+#include "membrane/reference.hpp"
+#include "membrane/stiffness.hpp"
+
+namespace corpuscle {
+
+/// @param surface       its first bodies are the cells
+/// @param type_of_cell  [cell] index into types
+MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
+                                  const std::vector<int>& type_of_cell);
+
+MotionViews make_motion_views(const MembraneViews& membranes);
+
+StiffnessViews make_stiffness_views(const MembraneViews& membranes);
+
+}  // namespace corpuscle

@@ -1,0 +1,32 @@
+// Which form of membrane viscosity the cells need, decided once at set-up.
+#pragma once
+
+#include "membrane/viscosity.hpp"
+
+namespace corpuscle {
+
+class MembraneViscosity {
+ public:
+  MembraneViscosity(const MembraneViews& membranes, bool tangential);
+
+  template <class Load>
+  void predict_velocity(const MembraneViews& m, const MotionViews& motion, const Load& load, double dt) const {
+    if (tangential_) {
+      predict_viscous_velocity<FullDamping>(m, motion, views_, load, dt);
+    } else {
+      predict_viscous_velocity<CentralDamping>(m, motion, views_, load, dt);
+    }
+  }
+
+  /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
+  void force(const MembraneViews& m, const Components<double>& v, const Components<double>& force) const;
+
+  /// Iterations of the last velocity solve, the largest over the cells. Waits for the device.
+  int iterations() const;
+
+ private:
+  bool tangential_;
+  ViscosityViews views_;
+};
+
+}  // namespace corpuscle

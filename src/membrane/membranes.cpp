@@ -1,0 +1,276 @@
+#include "membrane/membranes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.hpp"
+#include "membrane/copies.hpp"
+#include "membrane/diagnostics.hpp"
+#include "membrane/membrane_setup.hpp"
+#include "membrane/membrane_viscosity.hpp"
+#include "membrane/stiffness.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+constexpr int estimate_period = 100;  // calls of advance between estimates of the stiffness; the shape changes little
+constexpr int power_iterations = 30;  // gives the largest eigenvalue to about 5 %, well inside the margin of 0.3
+constexpr double step_margin = 0.3;   // of the largest stable step: links stiffen up to fivefold before they break
+constexpr double volume_rate = 1e-3;  // share of V0 per us by which a cell that starts away from V0 is brought there
+constexpr int most_retries = 4;
+constexpr int most_substeps = 1000000;
+
+}  // namespace
+
+Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies) {
+  std::vector<CellSettings> representative;
+  std::vector<CellReference> types;
+  std::vector<int> type_of_cell;
+  std::vector<TriangleMesh> bodies;
+  bool viscous = false, tangential = false;
+  for (const CellSettings& cell : cells) {
+    const auto known = std::find_if(representative.begin(), representative.end(),
+                                    [&](const CellSettings& other) { return same_type(cell, other); });
+    const int type = int(known - representative.begin());
+    if (known == representative.end()) {
+      representative.push_back(cell);
+      types.push_back(make_reference(cell));
+    }
+    type_of_cell.push_back(type);
+    bodies.push_back(placed_mesh(types[type], cell));
+    vertex_mass_.push_back(types[type].law.vertex_mass);
+    vertex_area_.push_back(types[type].smallest_vertex_area);
+    rest_area_.push_back(types[type].law.rest_area);
+    rest_volume_.push_back(types[type].law.rest_volume);
+    viscous |= types[type].law.central_damping > 0;
+    tangential |= types[type].law.tangential_damping > 0;
+  }
+  bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
+  views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
+  motion_ = make_motion_views(views_);
+  const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
+  start_x_ = Components<double>(label("start_x_vertex"), views_.vertices, 3);
+  start_v_ = Components<double>(label("start_v_vertex"), views_.vertices, 3);
+  if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(views_, tangential);
+}
+
+Membranes::~Membranes() = default;
+
+void Membranes::estimate_stiffness() {
+  if (views_.cells == 0) return;
+  const StiffnessViews work = make_stiffness_views(views_);
+  const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
+  largest_stiffness(views_, work, power_iterations, eigenvalue);
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), eigenvalue);
+  stiffness_.assign(host.data(), host.data() + views_.cells);
+  for (int c = 0; c < views_.cells; ++c) {
+    if (!(stiffness_[c] > 0) || !std::isfinite(stiffness_[c])) explain(c, 0);
+  }
+}
+
+double Membranes::stable_step_us() {
+  estimate_stiffness();
+  double step = 1e300;
+  for (int c = 0; c < views_.cells; ++c) {
+    step = std::min(step, step_margin * 2 * std::sqrt(vertex_mass_[c] / stiffness_[c]));
+  }
+  return step;
+}
+
+double Membranes::largest_stiffness_nN_per_um() {
+  estimate_stiffness();
+  return stiffness_.empty() ? 0 : *std::max_element(stiffness_.begin(), stiffness_.end());
+}
+
+int Membranes::substeps(double dt_us, double beta) const {
+  double step = dt_us;
+  for (std::size_t c = 0; c < stiffness_.size(); ++c) {
+    // Largest stable step of (m + c dt) v' = m v - dt k x, x' = x + dt v': k dt^2 = 2 (2 m + c dt).
+    const double stiff = stiffness_[c] / (step_margin * step_margin), drag = beta * vertex_area_[c];
+    step = std::min(step, (drag + std::sqrt(drag * drag + 4 * vertex_mass_[c] * stiff)) / stiff);
+  }
+  const double count = std::ceil(dt_us / step * (1 - 1e-12));
+  if (!(count <= most_substeps)) {
+    throw ComputationError(
+        fmt::format("membrane: a step of {:.3g} us would take {:.3g} sub-steps of {:.3g} us; reduce "
+                    "time.step_us or raise cells.mass_pg",
+                    dt_us, count, step));
+  }
+  return std::max(1, int(count));
+}
+
+void Membranes::compute_forces() {
+  if (views_.cells == 0) return;
+  Kokkos::deep_copy(views_.status, 0);
+  membrane_forces(views_, views_.surface.x, views_.force);
+  if (const int cell = trouble(); cell >= 0) explain(cell, 0);
+}
+
+template <class Load>
+void Membranes::take_substeps(int count, double dt, const Load& load) {
+  for (int s = 0; s < count; ++s) {
+    measure_membranes(views_, views_.surface.x);
+    evaluate_triangles(views_, views_.surface.x);
+    if (viscosity_) {
+      viscosity_->predict_velocity(views_, motion_, load, dt);
+    } else {
+      predict_velocity(views_, motion_, load, dt);
+    }
+    project_and_move(views_, motion_, dt, volume_rate);
+  }
+}
+
+void Membranes::take_substeps(int count, double dt, const Components<double>& traction, double beta,
+                              const Components<double>& v_star) {
+  if (traction.extent(0) == 0) {
+    take_substeps(count, dt, NoLoad{});
+  } else if (beta == 0) {
+    take_substeps(count, dt, TractionLoad{traction});
+  } else {
+    take_substeps(count, dt, RobinLoad{traction, v_star, beta});
+  }
+}
+
+int Membranes::advance(double dt_us, const Components<double>& traction, double beta,
+                       const Components<double>& v_star) {
+  if (views_.cells == 0) return 0;
+  if (beta > 0 && (traction.extent(0) == 0 || v_star.extent(0) == 0)) {
+    throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both traction and v_star");
+  }
+  if (calls_ % estimate_period == 0) estimate_stiffness();
+  ++calls_;
+  const int planned = substeps(dt_us, beta);
+  copy_motion(views_.vertices, views_.surface.x, views_.surface.v, start_x_, start_v_);
+  for (int attempt = 0; attempt <= most_retries; ++attempt) {
+    const int count = planned << attempt;
+    Kokkos::deep_copy(views_.status, 0);
+    take_substeps(count, dt_us / count, traction, beta, v_star);
+    if (trouble() < 0) return count;
+    copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
+  }
+  // Once more, sub-step by sub-step, up to where it goes wrong: what is there to see tells the cause.
+  const int count = planned << most_retries;
+  Kokkos::deep_copy(views_.status, 0);
+  int cell = -1;
+  for (int s = 0; s < count && cell < 0; ++s) {
+    take_substeps(1, dt_us / count, traction, beta, v_star);
+    cell = trouble();
+  }
+  explain(cell, dt_us);
+}
+
+int Membranes::trouble() {
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.status);
+  return host(0) - 1;
+}
+
+void Membranes::explain(int cell, double dt) {
+  const CellDiagnostics now = diagnostics()[cell];
+  const bool finite = std::isfinite(now.area_um2) && std::isfinite(now.volume_um3) && std::isfinite(now.stretch);
+  if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
+  const CellDiagnostics before = diagnostics()[cell];
+  const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", cell, before.centroid_um[0],
+                                        before.centroid_um[1], before.centroid_um[2]);
+  const std::string step =
+      dt > 0 ? fmt::format(" within a step of {:.3g} us, even in {} times as many sub-steps", dt, 1 << most_retries)
+             : std::string();
+  if (finite) {
+    throw ComputationError(fmt::format(
+        "membrane overstretched: {}: a link reached {:.3f} of its contour length{} ({:.3f} before). The load "
+        "is too large or the coupling unstable: reduce time.step_us or the load, or raise "
+        "cells.shear_modulus_uN_per_m or coupling.robin_coefficient",
+        where, now.stretch, step, before.stretch));
+  }
+  throw ComputationError(fmt::format(
+      "membrane position is not finite: {}{} (largest stretch before: {:.3f} of the contour length). The traction on "
+      "it "
+      "is not finite or the step too long: reduce time.step_us, or raise cells.mass_pg or coupling.robin_coefficient",
+      where, step, before.stretch));
+}
+
+void Membranes::save_state() {
+  if (!saved_) {
+    saved_ = std::make_unique<Snapshot>();
+    saved_->x = Components<double>(uninitialised("corpuscle::membrane::saved_x_vertex"), views_.vertices, 3);
+    saved_->v = Components<double>(uninitialised("corpuscle::membrane::saved_v_vertex"), views_.vertices, 3);
+  }
+  copy_motion(views_.vertices, views_.surface.x, views_.surface.v, saved_->x, saved_->v);
+  saved_->stiffness = stiffness_;
+  saved_->calls = calls_;
+}
+
+void Membranes::restore_state() {
+  if (!saved_) throw ComputationError("membrane: restore_state without save_state");
+  copy_motion(views_.vertices, saved_->x, saved_->v, views_.surface.x, views_.surface.v);
+  stiffness_ = saved_->stiffness;
+  calls_ = saved_->calls;
+}
+
+std::vector<CellDiagnostics> Membranes::diagnostics() {
+  if (views_.cells == 0) return {};
+  using Column = CellColumn;
+  const Table<double> table(uninitialised("corpuscle::membrane::diagnostics_cell"), views_.cells, Column::count);
+  measure_cells(views_, table);
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
+  std::vector<CellDiagnostics> all(views_.cells);
+  for (int c = 0; c < views_.cells; ++c) {
+    CellDiagnostics& d = all[c];
+    for (int k = 0; k < 3; ++k) {
+      d.centroid_um[k] = host(c, Column::centroid + k);
+      d.velocity_um_per_us[k] = host(c, Column::velocity + k);
+      d.lower_um[k] = host(c, Column::lower + k);
+      d.upper_um[k] = host(c, Column::upper + k);
+    }
+    d.area_um2 = host(c, Column::area);
+    d.volume_um3 = host(c, Column::volume);
+    d.rest_area_um2 = rest_area_[c];
+    d.rest_volume_um3 = rest_volume_[c];
+    d.springs_fJ = host(c, Column::springs);
+    d.bending_fJ = host(c, Column::bending);
+    d.global_area_fJ = host(c, Column::global_area);
+    d.local_area_fJ = host(c, Column::local_area);
+    d.volume_fJ = host(c, Column::global_volume);
+    d.stretch = host(c, Column::stretch);
+  }
+  return all;
+}
+
+std::vector<double> Membranes::state() const {
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.x);
+  const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.v);
+  std::vector<double> state{double(calls_)};
+  for (int c = 0; c < views_.cells; ++c) state.push_back(stiffness_.empty() ? 0 : stiffness_[c]);
+  for (int i = 0; i < views_.vertices; ++i) {
+    for (int d = 0; d < 3; ++d) state.push_back(x(i, d));
+    for (int d = 0; d < 3; ++d) state.push_back(v(i, d));
+  }
+  return state;
+}
+
+void Membranes::set_state(const std::vector<double>& state) {
+  const std::size_t expected = 1 + views_.cells + 6 * std::size_t(views_.vertices);
+  if (state.size() != expected) {
+    throw InputError(
+        fmt::format("membrane state of {} numbers: these {} cells of {} vertices take {}; restart with the "
+                    "case that wrote the checkpoint",
+                    state.size(), views_.cells, views_.vertices, expected));
+  }
+  auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.x);
+  auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.v);
+  auto at = state.begin();
+  calls_ = long(*at++);
+  stiffness_.assign(at, at + views_.cells);
+  if (calls_ == 0) stiffness_.clear();
+  at += views_.cells;
+  for (int i = 0; i < views_.vertices; ++i) {
+    for (int d = 0; d < 3; ++d) x(i, d) = *at++;
+    for (int d = 0; d < 3; ++d) v(i, d) = *at++;
+  }
+  Kokkos::deep_copy(views_.surface.x, x);
+  Kokkos::deep_copy(views_.surface.v, v);
+}
+
+}  // namespace corpuscle

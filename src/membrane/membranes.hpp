@@ -1,0 +1,119 @@
+// All cells' membranes: forces, motion, diagnostics, state.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "immersed/surface.hpp"
+#include "membrane/membrane_views.hpp"
+#include "membrane/motion.hpp"
+#include "membrane/reference.hpp"
+
+namespace corpuscle {
+
+/// What the history reports of one cell.
+struct CellDiagnostics {
+  Triple centroid_um{};           // of the enclosed volume
+  Triple velocity_um_per_us{};    // mean over the vertices, which carry equal masses
+  Triple lower_um{}, upper_um{};  // extremes along x, y, z
+  double area_um2 = 0, volume_um3 = 0;
+  double rest_area_um2 = 0, rest_volume_um3 = 0;  // A0, V0
+  double springs_fJ = 0, bending_fJ = 0, global_area_fJ = 0, local_area_fJ = 0, volume_fJ = 0;
+  double stretch = 0;  // largest length over contour length of any link; breaks at 1
+
+  double energy_fJ() const { return springs_fJ + bending_fJ + global_area_fJ + local_area_fJ + volume_fJ; }
+  Triple extent_um() const { return {upper_um[0] - lower_um[0], upper_um[1] - lower_um[1], upper_um[2] - lower_um[2]}; }
+};
+
+class MembraneViscosity;
+
+class Membranes {
+ public:
+  /// Build the cells' meshes and references, and one surface set that holds the cells first and then `rigid_bodies`.
+  /// @throws InputError  for settings out of range or meshes that are not closed
+  explicit Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies = {});
+  ~Membranes();
+  Membranes(const Membranes&) = delete;
+  Membranes& operator=(const Membranes&) = delete;
+
+  /// The surfaces as the fluid sees them; x and v are the membranes' own arrays. Normals and areas are refreshed by
+  /// update_surface_geometry, not here.
+  SurfaceSet& surfaces() { return views_.surface; }
+  const SurfaceSet& surfaces() const { return views_.surface; }
+  const MembraneViews& views() const { return views_; }
+  int cells() const { return views_.cells; }
+  int vertices() const { return views_.vertices; }
+
+  /// 0.3 times the largest stable undamped step at the present shape, over all cells, us. Costs about 240 kernels.
+  double stable_step_us();
+
+  /// Largest eigenvalue of any cell's Hessian at the present shape, nN/um. Costs as much.
+  double largest_stiffness_nN_per_um();
+
+  /// Internal forces at the present positions into views().force [vertex, 3] nN.
+  /// @throws ComputationError  if a link is stretched to its contour length
+  void compute_forces();
+
+  /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
+  int substeps(double dt_us, double beta) const;
+
+  /// The implicit membrane viscosity, or null if no cell has any.
+  const MembraneViscosity* viscosity() const { return viscosity_.get(); }
+
+  /// Advance all cells by `dt_us` with symplectic Euler in equal sub-steps dt_s, each of which solves
+  ///   (M/dt_s + beta A + D) v = M v/dt_s + F(x) + A t + beta A v_star,
+  /// projects v so that the volume stays V0, and moves x += dt_s v. D, the membrane viscosity, is implicit.
+  /// The sub-step is that of a vertex whose mass and drag see a stiffness 1/0.09 times the largest estimated: without
+  /// beta this is 0.3 x 2/omega_max, and where beta dominates 0.18 beta A/k, which resolves the fastest relaxation.
+  /// The stiffness is estimated anew every 100th call. A step that overstretches a link is tried again from the start
+  /// with 2, 4, 8 and 16 times as many sub-steps.
+  /// @param traction  [vertex, 3] kPa, or an empty view
+  /// @param beta      pg/um2/us, 0 for none
+  /// @param v_star    [vertex, 3] um/us, read only if beta > 0
+  /// @return the number of sub-steps taken
+  /// @throws ComputationError  naming the cell, the quantity, the likely cause and the setting to change; positions and
+  ///         velocities are then those from before the call
+  int advance(double dt_us, const Components<double>& traction = {}, double beta = 0,
+              const Components<double>& v_star = {});
+
+  /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
+  void save_state();
+  void restore_state();
+
+  /// One entry a cell. Copies from the device: for output, not for every sub-step.
+  std::vector<CellDiagnostics> diagnostics();
+
+  /// Everything that a restart needs for the same bits as without the stop.
+  std::vector<double> state() const;
+  /// @throws InputError  if the length does not fit these cells
+  void set_state(const std::vector<double>& state);
+
+ private:
+  struct Snapshot {
+    Components<double> x, v;  // [vertex, 3] of the cells
+    std::vector<double> stiffness;
+    long calls = 0;
+  };
+
+  void estimate_stiffness();
+  void take_substeps(int count, double dt, const Components<double>& traction, double beta,
+                     const Components<double>& v_star);
+  template <class Load>
+  void take_substeps(int count, double dt, const Load& load);
+  int trouble();
+  [[noreturn]] void explain(int cell, double dt);
+
+  MembraneViews views_;
+  MotionViews motion_;
+  Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
+  std::vector<double> vertex_mass_;              // [cell] pg
+  std::vector<double> vertex_area_;              // [cell] smallest at rest, um2
+  std::vector<double> stiffness_;                // [cell] largest eigenvalue, nN/um; empty before the first estimate
+  std::vector<double> rest_area_, rest_volume_;  // [cell]
+  long calls_ = 0;                               // of advance
+  std::unique_ptr<Snapshot> saved_;
+  std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,123 @@
+#include "membrane/reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "core/error.hpp"
+#include "core/units.hpp"
+#include "membrane/coarse_graining.hpp"
+#include "membrane/mesh_generator.hpp"
+#include "membrane/mesh_io.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+void require(bool holds, const char* key, double value, const char* allowed) {
+  if (!holds || !std::isfinite(value)) {
+    throw InputError(fmt::format("cells.{} = {}: {}", key, value, allowed));
+  }
+}
+
+CellLaw make_law(const CellSettings& c) {
+  const double eta = c.membrane_viscosity_N_s_per_m * units::N_s_per_m;
+  require(c.mass_pg > 0, "mass_pg", c.mass_pg, "must be positive; a real cell weighs 27 to 121 pg");
+  require(c.shear_modulus_uN_per_m > 0, "shear_modulus_uN_per_m", c.shear_modulus_uN_per_m,
+          "must be positive; a healthy cell has 4 to 10");
+  require(c.bending_modulus_fJ >= 0, "bending_modulus_fJ", c.bending_modulus_fJ,
+          "must not be negative; a healthy cell has 2.4e-4");
+  require(c.area_modulus_uN_per_m >= 0, "area_modulus_uN_per_m", c.area_modulus_uN_per_m, "must not be negative");
+  require(c.volume_modulus_Pa >= 0, "volume_modulus_Pa", c.volume_modulus_Pa, "must not be negative");
+  require(eta >= 0, "membrane_viscosity_N_s_per_m", c.membrane_viscosity_N_s_per_m,
+          "must not be negative; measured values are about 0.5e-6");
+  require(c.local_area_modulus_uN_per_m > 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m,
+          "must be positive: without it triangles can collapse and the solution gets stuck; the model's value is 4.82");
+  CellLaw law;
+  law.spring.stiffness = c.shear_modulus_uN_per_m * units::uN_per_m / shear_modulus_over_stiffness();
+  law.bending = 2 / std::sqrt(3.0) * c.bending_modulus_fJ;
+  law.area = c.area_modulus_uN_per_m * units::uN_per_m;
+  law.local_area = c.local_area_modulus_uN_per_m * units::uN_per_m;
+  law.volume = c.volume_modulus_Pa * units::Pa;
+  if (c.dissipation == CellSettings::Dissipation::central) {
+    law.central_damping = 4 * eta / std::sqrt(3.0);  // a flat network's shear viscosity is then eta
+  } else {
+    law.tangential_damping = 12 * eta / (13 * std::sqrt(3.0));  // Equation 11
+    law.central_damping = 4 * eta / (13 * std::sqrt(3.0));
+  }
+  return law;
+}
+
+TriangleMesh make_mesh(const CellSettings& c) {
+  if (c.mesh.empty()) return biconcave_mesh(c.vertices);
+  TriangleMesh mesh = read_mesh(c.mesh);
+  check_closed_surface(mesh, c.mesh);
+  return mesh;
+}
+
+/// Lengths, signed angles and areas of the mesh as it is.
+void measure(CellReference& r) {
+  const auto& mesh = r.mesh;
+  const auto neighbours = triangle_neighbours(mesh);
+  const auto at = [&](int i) { return Vec3{mesh.vertices[i][0], mesh.vertices[i][1], mesh.vertices[i][2]}; };
+  const auto twice_area = [&](int t) {
+    const auto& c = mesh.triangles[t];
+    return cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0]));
+  };
+  std::vector<double> vertex_area(mesh.vertices.size(), 0);
+  for (int t = 0; t < int(mesh.triangles.size()); ++t) {
+    const Vec3 n = twice_area(t);
+    std::array<double, 3> length, angle;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 side = at(mesh.triangles[t][(k + 2) % 3]) - at(mesh.triangles[t][(k + 1) % 3]);
+      const Vec3 other = twice_area(neighbours[t][k]);
+      length[k] = norm(side);
+      angle[k] = std::atan2(dot(cross(n, other), side) / length[k], dot(n, other));
+      vertex_area[mesh.triangles[t][k]] += norm(n) / 6;
+    }
+    r.rest_length.push_back(length);
+    r.rest_angle.push_back(angle);
+    r.rest_area.push_back(0.5 * norm(n));
+  }
+  r.smallest_vertex_area = *std::min_element(vertex_area.begin(), vertex_area.end());
+  r.law.rest_area = area(mesh);
+  r.law.rest_volume = volume(mesh);
+}
+
+auto type_key(const CellSettings& c) {
+  return std::tie(c.vertices, c.mesh, c.mass_pg, c.reference, c.shear_modulus_uN_per_m, c.bending_modulus_fJ,
+                  c.area_modulus_uN_per_m, c.local_area_modulus_uN_per_m, c.volume_modulus_Pa,
+                  c.membrane_viscosity_N_s_per_m, c.dissipation);
+}
+
+}  // namespace
+
+CellReference make_reference(const CellSettings& cell) {
+  CellReference r;
+  r.law = make_law(cell);
+  r.mesh = make_mesh(cell);
+  const int vertices = int(r.mesh.vertices.size());
+  r.law.vertex_mass = cell.mass_pg / vertices;
+  measure(r);
+  if (cell.reference != CellSettings::Reference::shape) {
+    const double angle = spontaneous_angle(vertices);
+    for (auto& a : r.rest_angle) a = {angle, angle, angle};
+  }
+  if (cell.reference == CellSettings::Reference::uniform) {
+    if (cell.mesh.empty()) r.law.rest_area = 135, r.law.rest_volume = 94;  // Table 1
+    const double length = uniform_edge_length(r.law.rest_area, vertices);
+    for (auto& l : r.rest_length) l = {length, length, length};
+    std::fill(r.rest_area.begin(), r.rest_area.end(), r.law.rest_area / double(r.mesh.triangles.size()));
+  }
+  return r;
+}
+
+TriangleMesh placed_mesh(const CellReference& reference, const CellSettings& cell) {
+  return transform(reference.mesh, cell.axis, cell.spin_deg, cell.center_um);
+}
+
+bool same_type(const CellSettings& a, const CellSettings& b) { return type_key(a) == type_key(b); }
+
+}  // namespace corpuscle

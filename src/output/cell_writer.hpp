@@ -1,0 +1,48 @@
+// cells.h5 and cells.xdmf: the surfaces of all cells and bodies at stored times, as ParaView opens them.
+#pragma once
+
+#ifdef CORPUSCLE_HDF5
+
+#include "output/series.hpp"
+
+namespace corpuscle {
+
+/// Values at all vertices, components of one vertex side by side: host memory of vertices * components numbers.
+struct VertexField {
+  std::string name;  // with its unit
+  int components;    // 1 or 3
+  const double* values;
+};
+
+/// Rank 0 writes: every rank holds all surfaces. The file is closed and complete between stored times.
+class CellWriter {
+ public:
+  /// @param triangles   three vertex numbers each, over all bodies
+  /// @param bodies      body of each triangle
+  /// @param vertices    how many there are
+  /// @param restart_us  an existing file keeps its times up to this one and is continued; absent: a new file
+  /// @throws InputError  on every rank, if the files cannot be written or the one to continue has other surfaces
+  CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
+             const std::vector<std::int32_t>& bodies, int vertices, std::optional<double> restart_us = {});
+
+  /// Store one time (in a stretching test, which has no time, the force in pN). A step that is there already is
+  /// replaced.
+  /// @param x  vertex positions, vertices * 3, um
+  /// @throws ComputationError  on every rank, for example on a full disk
+  void write(double time_us, long step, const double* x, const std::vector<VertexField>& fields = {});
+
+ private:
+  void create(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies) const;
+  void resume(double restart_us);
+  void store(double time_us, long step, const double* x, const std::vector<VertexField>& fields);
+  void rewrite_xdmf() const;
+
+  std::string path_, xdmf_path_;
+  Comm comm_;
+  hsize_t vertices_, triangles_;
+  std::vector<StoredTime> times_;  // rank 0 only
+};
+
+}  // namespace corpuscle
+
+#endif

@@ -1,0 +1,78 @@
+// checkpoint.h5: everything a run needs to go on, as named arrays under a header. Readable on any number of ranks.
+#pragma once
+
+#ifdef CORPUSCLE_HDF5
+
+#include <array>
+#include <memory>
+
+#include "output/hdf5_file.hpp"
+
+namespace corpuscle {
+
+struct CheckpointHeader {
+  static constexpr int format_version = 1;
+
+  std::string git;             // hash of the program that wrote it; filled in by the writer
+  std::string resolved;        // the case, every key with the value used
+  std::array<int, 3> cells{};  // of the whole grid; zero without a fluid
+  long step = 0;
+  double time_us = 0;
+};
+
+/// Writes under another name until commit(), so the last good checkpoint survives whatever happens before.
+class CheckpointWriter {
+ public:
+  /// All calls are collective.
+  /// @throws InputError  the file cannot be created
+  CheckpointWriter(std::string path, const Comm& comm, const CheckpointHeader& header);
+  /// Without commit() the unfinished file is removed.
+  ~CheckpointWriter();
+  CheckpointWriter(const CheckpointWriter&) = delete;
+  CheckpointWriter& operator=(const CheckpointWriter&) = delete;
+
+  /// The same on all ranks.
+  /// @throws ComputationError  writing failed; the previous checkpoint is as it was
+  void add(const std::string& name, const Shape& shape, const double* values);
+  void add(const std::string& name, const Shape& shape, const std::int64_t* values);
+  /// Each rank its own box of the whole.
+  void add(const std::string& name, const Shape& shape, const Slab& mine, const double* values);
+  void add(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* values);
+
+  /// Finish the file and put it in the place of the previous one.
+  void commit();
+
+ private:
+  std::string path_, temporary_;
+  Comm comm_;
+  std::unique_ptr<Hdf5File> file_;
+};
+
+/// Each rank reads on its own, so every rank finds the same faults.
+class CheckpointReader {
+ public:
+  /// @throws InputError  the file is missing, not HDF5, cut short, foreign, unfinished, or of another format version
+  explicit CheckpointReader(const std::string& path);
+
+  const CheckpointHeader& header() const { return header_; }
+  /// @throws InputError  the checkpoint's grid is another one
+  void require_grid(const std::array<int, 3>& cells) const;
+  bool has(const std::string& name) const { return file_.has(name); }
+  Shape shape(const std::string& name) const { return file_.shape(name); }
+
+  /// @throws InputError  the array is missing or has another shape than the case needs
+  void read(const std::string& name, const Shape& shape, double* values) const;
+  void read(const std::string& name, const Shape& shape, std::int64_t* values) const;
+  void read(const std::string& name, const Shape& shape, const Slab& mine, double* values) const;
+  void read(const std::string& name, const Shape& shape, const Slab& mine, std::int64_t* values) const;
+
+ private:
+  void require_shape(const std::string& name, const Shape& shape) const;
+
+  Hdf5File file_;
+  CheckpointHeader header_;
+};
+
+}  // namespace corpuscle
+
+#endif

@@ -1,0 +1,58 @@
+// report.json: what a run did, how long each part took, and how large its errors are.
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "input/case.hpp"
+#include "parallel/comm.hpp"
+
+namespace corpuscle {
+
+/// A count that is taken once per step: its mean and maximum.
+struct Tally {
+  long samples = 0;
+  double sum = 0, largest = 0;
+  void add(double value) {
+    ++samples;
+    sum += value;
+    largest = value > largest ? value : largest;
+  }
+};
+
+struct Report {
+  std::string case_path, title;
+  std::string resolved;                       // every key with the value used, as TOML
+  std::vector<std::string> active, left_out;  // modules
+  long steps = 0;
+  double simulated_us = 0;
+  double wall_s = 0;
+  std::map<std::string, double> wall_s_by_part;  // of this rank; all ranks have the same parts
+  Tally momentum_iterations, pressure_iterations, coupling_iterations;
+  /// Error measures by name; those of the contract that a run does not have are written as null.
+  nlohmann::json errors = nlohmann::json::object();
+  /// Further entries of the top level.
+  nlohmann::json extra = nlohmann::json::object();
+};
+
+/// Write `folder`/report.json. All ranks call: wall_s_by_part is the largest over the ranks, memory is summed.
+/// @throws InputError, ComputationError  on every rank, if the file cannot be written
+void write_report(const std::string& folder, const Comm& comm, const Report& report);
+
+/// Outputs that the case asks for and this build cannot write, one line each with the reason; empty with HDF5.
+std::vector<std::string> outputs_left_out(const OutputSettings& output);
+
+/// Hash of the source this program was built from, "unknown" outside a checkout.
+std::string git_hash();
+/// Name of the Kokkos execution space that kernels run in, such as "OpenMP".
+std::string backend_name();
+/// Threads of the host execution space on this rank.
+int thread_count();
+/// Kokkos version and settings, as Kokkos prints them.
+std::string kokkos_configuration();
+/// Largest memory that this rank has occupied so far, MB.
+double peak_rss_mb();
+
+}  // namespace corpuscle

@@ -1,0 +1,151 @@
+#include "parallel/halo.hpp"
+
+#include "core/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace corpuscle {
+
+namespace {
+
+/// Rank coordinates, i fastest.
+std::array<int, 3> coordinates(int rank, const std::array<int, 3>& ranks) {
+  return {rank % ranks[0], (rank / ranks[0]) % ranks[1], rank / (ranks[0] * ranks[1])};
+}
+
+bool cut_is_possible(const std::array<int, 3>& ranks, const std::array<int, 3>& global) {
+  for (int d = 0; d < 3; ++d)
+    if (ranks[d] > 1 && global[d] / ranks[d] < IndexSpace::halo) return false;
+  return true;
+}
+
+/// Slab of `layers` cells on one side, inside (owned) or outside (halo), as wide as already exchanged directions allow.
+CellBox slab(const IndexSpace& index, int d, int side, bool outside) {
+  CellBox box;
+  for (int e = 0; e < 3; ++e) {
+    const int pad = e < d ? IndexSpace::halo : 0;
+    box.lower[e] = -pad;
+    box.upper[e] = index.n[e] + pad;
+  }
+  const int h = IndexSpace::halo, n = index.n[d];
+  if (side == 0) {
+    box.lower[d] = outside ? -h : 0;
+    box.upper[d] = outside ? 0 : h;
+  } else {
+    box.lower[d] = outside ? n : n - h;
+    box.upper[d] = outside ? n + h : n;
+  }
+  return box;
+}
+
+}  // namespace
+
+IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,
+                     std::array<int, 3>* ranks_per_direction) {
+  std::array<int, 3> best{};
+  double least = std::numeric_limits<double>::max();
+  for (int a = 1; a <= comm.size(); ++a) {
+    if (comm.size() % a) continue;
+    for (int b = 1; b <= comm.size() / a; ++b) {
+      if ((comm.size() / a) % b) continue;
+      const std::array<int, 3> ranks{a, b, comm.size() / a / b};
+      if (!cut_is_possible(ranks, global)) continue;
+      double cut = 0;
+      for (int d = 0; d < 3; ++d)
+        cut += (ranks[d] - 1.0) * global[(d + 1) % 3] * global[(d + 2) % 3];
+      if (cut < least) least = cut, best = ranks;
+    }
+  }
+  if (best[0] == 0)
+    throw InputError(fmt::format(
+        "the grid of {} x {} x {} cells cannot be cut into {} blocks of at least {} cells a side: use fewer ranks or "
+        "a finer grid (grid.nodes)",
+        global[0], global[1], global[2], comm.size(), IndexSpace::halo));
+  const auto at = coordinates(comm.rank(), best);
+  IndexSpace index;
+  for (int d = 0; d < 3; ++d) {
+    const int share = global[d] / best[d], rest = global[d] % best[d];
+    index.n[d] = share + (at[d] < rest ? 1 : 0);
+    index.first[d] = at[d] * share + std::min(at[d], rest);
+    index.global[d] = global[d];
+    index.periodic[d] = periodic[d];
+  }
+  if (ranks_per_direction) *ranks_per_direction = best;
+  return index;
+}
+
+Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& ranks) : comm_(comm), index_(index) {
+  const auto at = coordinates(comm.rank(), ranks);
+  int largest = 0;
+  for (int d = 0; d < 3; ++d) {
+    for (int side = 0; side < 2; ++side) {
+      auto to = at;
+      to[d] += side == 0 ? -1 : 1;
+      const bool beyond = to[d] < 0 || to[d] >= ranks[d];
+      to[d] = (to[d] + ranks[d]) % ranks[d];
+      neighbour_[d][side] = beyond && !index.periodic[d] ? -1 : to[0] + ranks[0] * (to[1] + ranks[1] * to[2]);
+      if (neighbour_[d][side] >= 0 && neighbour_[d][side] != comm.rank())
+        largest = std::max(largest, slab(index, d, side, true).size());
+    }
+  }
+  for (int side = 0; side < 2 && largest > 0; ++side) {
+    send_[side] = Array<double>(uninitialised("corpuscle::halo::send"), 3 * largest);
+    receive_[side] = Array<double>(uninitialised("corpuscle::halo::receive"), 3 * largest);
+    send_host_[side] = Kokkos::create_mirror_view(send_[side]);
+    receive_host_[side] = Kokkos::create_mirror_view(receive_[side]);
+  }
+}
+
+template <class Field>
+void Halo::run(const Field& field) {
+  using Value = typename Field::non_const_value_type;
+  const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
+  for (int d = 0; d < 3; ++d) {
+    const int low = neighbour_[d][0], high = neighbour_[d][1];
+    if (low == comm_.rank() && high == comm_.rank()) {  // periodic within this rank
+      copy_shifted(index_, slab(index_, d, 0, true), d, index_.n[d], field);
+      copy_shifted(index_, slab(index_, d, 1, true), d, -index_.n[d], field);
+      continue;
+    }
+#ifdef CORPUSCLE_MPI
+    MPI_Request request[4];
+    int pending = 0;
+    for (int side = 0; side < 2; ++side) {
+      if (neighbour_[d][side] < 0) continue;
+      const int count = slab(index_, d, side, true).size() * components;
+      MPI_Irecv(receive_host_[side].data(), count * static_cast<int>(sizeof(Value)), MPI_BYTE, neighbour_[d][side],
+                1 - side, comm_.handle(), &request[pending++]);
+    }
+    for (int side = 0; side < 2; ++side) {
+      if (neighbour_[d][side] < 0) continue;
+      const CellBox box = slab(index_, d, side, false);
+      Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(send_[side].data()),
+                                                                    box.size() * components);
+      pack_box(index_, box, field, buffer);
+      Kokkos::deep_copy(send_host_[side], send_[side]);
+      Exec().fence();
+      MPI_Isend(send_host_[side].data(), box.size() * components * static_cast<int>(sizeof(Value)), MPI_BYTE,
+                neighbour_[d][side], side, comm_.handle(), &request[pending++]);
+    }
+    MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
+    for (int side = 0; side < 2; ++side) {
+      if (neighbour_[d][side] < 0) continue;
+      const CellBox box = slab(index_, d, side, true);
+      Kokkos::deep_copy(receive_[side], receive_host_[side]);
+      Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(receive_[side].data()),
+                                                                    box.size() * components);
+      unpack_box(index_, box, buffer, field);
+    }
+#endif
+  }
+}
+
+template void Halo::run(const Components<double>&);
+template void Halo::run(const Array<double>&);
+template void Halo::run(const Array<int>&);
+template void Halo::run(const Array<NodeKind>&);
+
+}  // namespace corpuscle

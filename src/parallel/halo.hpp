@@ -1,0 +1,40 @@
+// How the grid is cut over ranks, and the exchange of halo layers between them.
+#pragma once
+
+#include "grid/halo_copy.hpp"
+#include "parallel/comm.hpp"
+
+#include <array>
+
+namespace corpuscle {
+
+/// Cut a grid of global[] cells into comm.size() blocks along all three directions, with the least surface.
+/// @throws InputError  when some block would be thinner than the halo.
+IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,
+                     std::array<int, 3>* ranks_per_direction = nullptr);
+
+/// Fills halo layers from neighbouring ranks and periodic images; layers beyond physical boundaries are not touched.
+class Halo {
+ public:
+  Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& ranks_per_direction);
+
+  void exchange(const Components<double>& field) { run(field); }
+  void exchange(const Array<double>& field) { run(field); }
+  void exchange(const Array<int>& field) { run(field); }
+  void exchange(const Array<NodeKind>& field) { run(field); }
+
+  /// Rank owning the neighbouring block on side (0 low, 1 high) of direction d; -1 beyond a physical boundary.
+  int neighbour(int d, int side) const { return neighbour_[d][side]; }
+
+ private:
+  template <class Field>
+  void run(const Field& field);
+
+  Comm comm_;
+  IndexSpace index_;
+  int neighbour_[3][2];
+  Array<double> send_[2], receive_[2];
+  Array<double>::HostMirror send_host_[2], receive_host_[2];
+};
+
+}  // namespace corpuscle

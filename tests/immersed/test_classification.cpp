@@ -1,0 +1,281 @@
+// Which nodes are fluid, immersed and inside.
+#include <catch2/catch.hpp>
+
+#include "brute_force.hpp"
+
+using namespace corpuscle;
+using namespace scene;
+
+namespace {
+
+ImmersedOptions plain() { return {}; }
+
+struct Findings {
+  int wrong_side = 0, leaks = 0, stray = 0, wrong_distance = 0, lonely = 0, band = 0;
+};
+
+/// Compare every owned node and link with brute force.
+Findings inspect(const GridViews& grid, const ImmersedBoundary& ib, const Soup& soup) {
+  Findings found;
+  const IndexSpace& index = grid.index;
+  const auto x = on_host(grid.x), foot = on_host(ib.band().foot);
+  const auto kind = on_host(ib.nodes().kind);
+  const auto key = on_host(ib.band().key);
+  const auto distance = on_host(ib.band().distance);
+  for (int c = 0; c < index.size(); ++c) {
+    int i[3];
+    index.unpack(c, i[0], i[1], i[2]);
+    if (!index.owns(i[0], i[1], i[2])) continue;
+    const Vec3 p = load(x, c);
+    found.wrong_side += soup.inside(p) != (kind(c) == NodeKind::inside);
+    if (key(c) != no_key) {
+      ++found.band;
+      // The search ranks distances in single precision.
+      const double exact = soup.distance(p);
+      found.wrong_distance += std::fabs(std::fabs(distance(c)) - exact) > 1e-6 * (1 + exact);
+      found.wrong_distance += std::fabs(norm(p - load(foot, c)) - std::fabs(distance(c))) > 1e-12;
+    }
+    int fluid_neighbours = 0, crossed = 0;
+    for (int side = 0; side < 6; ++side) {
+      const int n = c + (side % 2 ? 1 : -1) * index.stride(side / 2);
+      fluid_neighbours += kind(n) == NodeKind::fluid;
+      crossed += soup.crossings(p, load(x, n)) > 0;
+    }
+    found.leaks += kind(c) == NodeKind::fluid && crossed > 0;
+    found.lonely += kind(c) == NodeKind::fluid && fluid_neighbours == 0;
+    found.stray += kind(c) == NodeKind::immersed && crossed == 0 && fluid_neighbours > 0;
+  }
+  return found;
+}
+
+void check_scene(const GridViews& grid, const SurfaceSet& surface) {
+  ImmersedBoundary ib(grid, surface, plain());
+  ib.classify();
+  const Findings found = inspect(grid, ib, Soup(surface));
+  CHECK(found.wrong_side == 0);
+  CHECK(found.leaks == 0);
+  CHECK(found.lonely == 0);
+  CHECK(found.stray == 0);
+  CHECK(found.wrong_distance == 0);
+  CHECK(found.band > ib.counts().immersed);
+  CHECK(ib.counts().owned_vertices == surface.vertices);
+  CHECK(ib.counts().lost_vertex == -1);
+}
+
+}  // namespace
+
+TEST_CASE("classification of a biconcave cell agrees with brute force") {
+  const double tilt = GENERATE(0.0, 0.6);
+  SECTION("isotropic") {
+    check_scene(make_grid({{22, 22, 14}}, uniform({-4.95, -4.95, -3.15}, {0.45, 0.45, 0.45})),
+                make_surface_set({biconcave(3, {0.02, 0.01, -0.03}, tilt * 0.3)}));
+  }
+  SECTION("anisotropic, thin side across the coarse direction") {
+    check_scene(make_grid({{30, 30, 14}}, uniform({-4.65, -4.65, -6.3}, {0.31, 0.31, 0.9})),
+                make_surface_set({biconcave(3, {0.02, 0.01, 0.45 - 0.03}, tilt)}));
+  }
+  SECTION("skewed") {
+    check_scene(make_grid({{36, 36, 16}}, skewed({-7.25, -4.7, -8.6}, {0.31, 0.31, 0.9})),
+                make_surface_set({biconcave(3, {0.02, 0.01, -0.03}, tilt)}));
+  }
+  SECTION("wavy") {
+    check_scene(make_grid({{32, 32, 16}}, wavy({-5.0, -5.0, -7.2}, {0.31, 0.31, 0.9})),
+                make_surface_set({biconcave(3, {0.02, 0.01, -0.03}, tilt)}));
+  }
+}
+
+TEST_CASE("a film thinner than the grid separates its two sides") {
+  // The dimple, 0.81 um thick, between two layers of nodes 1.2 um apart: its middle holds no inside node.
+  const GridViews grid = make_grid({{24, 24, 10}}, uniform({-4.8, -4.8, -6.0}, {0.4, 0.4, 1.2}));
+  const SurfaceSet surface = make_surface_set({biconcave(3, {0.013, 0.017, 0})});
+  ImmersedBoundary ib(grid, surface, plain());
+  ib.classify();
+  const auto kind = on_host(ib.nodes().kind);
+  CHECK(kind(grid.index.cell(12, 12, 4)) == NodeKind::immersed);
+  CHECK(kind(grid.index.cell(12, 12, 5)) == NodeKind::immersed);
+  const Findings found = inspect(grid, ib, Soup(surface));
+  CHECK(found.leaks == 0);
+  CHECK(found.wrong_side == 0);
+  CHECK(ib.counts().cut_links > 0);
+}
+
+TEST_CASE("nodes on the surface and surfaces aligned with the grid are no exception") {
+  // Vertices, edges and poles of the sphere fall exactly on nodes and grid planes.
+  const GridViews grid = make_grid({{17, 17, 17}}, uniform({-4.25, -4.25, -4.25}, {0.5, 0.5, 0.5}));
+  const SurfaceSet surface = make_surface_set({sphere(2, 2.0, {0, 0, 0})});
+  ImmersedBoundary ib(grid, surface, plain());
+  ib.classify();
+  const auto kind = on_host(ib.nodes().kind);
+  const auto x = on_host(grid.x);
+  const Soup soup(surface);
+  for (int k = 0; k < 17; ++k) {
+    for (int j = 0; j < 17; ++j) {
+      for (int i = 0; i < 17; ++i) {
+        const int c = grid.index.cell(i, j, k);
+        const double r = norm(load(x, c));
+        // Chords of the level-2 sphere come as near as 0.95 radii to the centre.
+        if (r < 0.95 * 2.0 - 1e-9) REQUIRE(kind(c) == NodeKind::inside);
+        if (r > 2.0 + 0.5 + 1e-9) REQUIRE(kind(c) == NodeKind::fluid);
+        for (int d = 0; d < 3; ++d) {
+          const int n = c + grid.index.stride(d);
+          if (kind(c) == NodeKind::fluid && kind(n) == NodeKind::fluid) {
+            REQUIRE(soup.crossings(load(x, c), load(x, n)) == 0);
+          }
+          REQUIRE_FALSE((kind(c) == NodeKind::fluid && kind(n) == NodeKind::inside));
+          REQUIRE_FALSE((kind(c) == NodeKind::inside && kind(n) == NodeKind::fluid));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("a cell that creeps through the grid is classified like one put there afresh") {
+  const GridViews grid = make_grid({{30, 30, 14}}, uniform({-4.65, -4.65, -6.3}, {0.31, 0.31, 0.9}));
+  const SurfaceSet moving = make_surface_set({biconcave(3, {0, 0, -0.9}, 0.3)});
+  ImmersedBoundary ib(grid, moving, plain());
+  const Vec3 step{0.03, -0.02, 0.11};
+  for (int n = 0; n < 12; ++n) {
+    ib.classify();
+    ImmersedBoundary fresh(grid, moving, plain());
+    fresh.classify();
+    const auto kind = on_host(ib.nodes().kind), expected = on_host(fresh.nodes().kind);
+    const auto body = on_host(ib.nodes().body), expected_body = on_host(fresh.nodes().body);
+    for (int c = 0; c < grid.index.size(); ++c) {
+      REQUIRE(kind(c) == expected(c));
+      REQUIRE(body(c) == expected_body(c));
+    }
+    REQUIRE(ib.counts().immersed == fresh.counts().immersed);
+    REQUIRE(ib.counts().uncovered == 0);  // a step is a tenth of a node: no node jumps over the immersed layer
+    move(moving, step);
+  }
+}
+
+TEST_CASE("blocks of a decomposed grid agree with the whole, each vertex owned once") {
+  const Mapping mapping = wavy({-5.0, -5.0, -7.2}, {0.31, 0.31, 0.9});
+  const std::array<int, 3> n{32, 32, 16};
+  const SurfaceSet surface = make_surface_set({biconcave(3, {0.3, 0.01, -0.03}, 0.5), sphere(2, 1.0, {0, 0, 4.5})});
+  const GridViews grid = make_grid({n}, mapping);
+  ImmersedBoundary whole(grid, surface, plain());
+  whole.classify();
+  whole.build_stencils();
+  const auto kind = on_host(whole.nodes().kind);
+  std::vector<int> owners(surface.vertices, 0);
+  int faces = 0, immersed = 0;
+  for (int part = 0; part < 8; ++part) {
+    Block block{n};
+    for (int d = 0; d < 3; ++d) {
+      const int half = n[d] / 2 - 1;
+      block.first[d] = (part >> d) & 1 ? half : 0;
+      block.n[d] = (part >> d) & 1 ? n[d] - half : half;
+    }
+    const GridViews piece = make_grid(block, mapping);
+    ImmersedBoundary ib(piece, surface, plain());
+    ib.classify();
+    ib.build_stencils();
+    const auto piece_kind = on_host(ib.nodes().kind);
+    for (int k = -1; k <= piece.index.n[2]; ++k) {
+      for (int j = -1; j <= piece.index.n[1]; ++j) {
+        for (int i = -1; i <= piece.index.n[0]; ++i) {
+          REQUIRE(piece_kind(piece.index.cell(i, j, k)) ==
+                  kind(grid.index.cell(i + block.first[0], j + block.first[1], k + block.first[2])));
+        }
+      }
+    }
+    const std::vector<char> owned = ib.owned_vertices();
+    for (int v = 0; v < surface.vertices; ++v) owners[v] += owned[v];
+    faces += ib.counts().faces;
+    immersed += ib.counts().immersed;
+  }
+  for (int v = 0; v < surface.vertices; ++v) REQUIRE(owners[v] == 1);
+  CHECK(faces == whole.counts().faces);
+  CHECK(immersed == whole.counts().immersed);
+}
+
+TEST_CASE("a block that lies wholly inside a body knows it") {
+  const Block block{{40, 40, 40}, {18, 18, 18}, {4, 4, 4}};
+  const GridViews piece = make_grid(block, uniform({-4, -4, -4}, {0.2, 0.2, 0.2}));
+  ImmersedBoundary ib(piece, make_surface_set({sphere(3, 3.0, {0, 0, 0})}), plain());
+  ib.classify();
+  CHECK(ib.counts().inside == 64);
+  CHECK(ib.counts().fluid == 0);
+}
+
+TEST_CASE("a body across a periodic boundary is seen from both ends") {
+  const int cells = 20;
+  const double h = 0.3, period = cells * h;
+  Block block{{20, 20, cells}};
+  block.periodic = {false, false, true};
+  const GridViews grid = make_grid(block, uniform({-3, -3, 0}, {h, h, h}));
+  ImmersedOptions options;
+  options.period[2] = {0, 0, period};
+  const SurfaceSet across = make_surface_set({sphere(3, 1.5, {0.02, 0.03, 0.1})});
+  const SurfaceSet centred = make_surface_set({sphere(3, 1.5, {0.02, 0.03, 0.1 + 10 * h})});
+  ImmersedBoundary ib(grid, across, options), reference(grid, centred, options);
+  ib.classify();
+  reference.classify();
+  CHECK(ib.counts().owned_vertices == across.vertices);
+  CHECK(ib.counts().immersed == reference.counts().immersed);
+  CHECK(ib.counts().faces == reference.counts().faces);
+  const auto kind = on_host(ib.nodes().kind), expected = on_host(reference.nodes().kind);
+  for (int k = 0; k < cells; ++k) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i) {
+        REQUIRE(kind(grid.index.cell(i, j, k)) == expected(grid.index.cell(i, j, (k + 10) % cells)));
+      }
+    }
+  }
+}
+
+TEST_CASE("vertices beyond a boundary and close to a wall are reported") {
+  const GridViews grid = make_grid({{20, 20, 20}}, uniform({-2, -2, -2}, {0.2, 0.2, 0.2}));
+  const SurfaceSet surface = make_surface_set({sphere(2, 0.5, {0, 0, 0}), sphere(2, 0.6, {1.1, 0.01, 0})});
+  ImmersedOptions options;
+  options.wall = {false, true, true, true, false, false};
+  ImmersedBoundary ib(grid, surface, options);
+  ib.classify();
+  CHECK(ib.counts().lost_vertex == -1);
+  // The rightmost vertex sits at x = 1.7, 0.3 um or 1.5 spacings from the wall at x = 2; one node of slack for a
+  // vertex of the mesh that is not exactly at the pole.
+  CHECK(ib.counts().wall_spacings == Approx(1.5).margin(0.1));
+  CHECK(ib.counts().wall_vertex >= 162);
+  move(surface, {0.5, 0, 0});
+  ib.classify();
+  REQUIRE(ib.counts().lost_vertex >= 162);
+  CHECK(ib.counts().owned_vertices < surface.vertices);
+  CHECK(ib.describe_vertex(ib.counts().lost_vertex).find("body 1, vertex ") == 0);
+}
+
+TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body") {
+  const GridViews grid = make_grid({{30, 24, 14}}, uniform({-4.65, -4.65, -6.3}, {0.31, 0.38, 0.9}));
+  const SurfaceSet surface = make_surface_set({biconcave(3, {0.02, 0.01, -1.5}, 0.2), sphere(2, 1.2, {0, 0, 3.1})});
+  ImmersedBoundary ib(grid, surface, plain());
+  ib.classify();
+  const auto kind = on_host(ib.nodes().kind);
+  const auto body = on_host(ib.nodes().body);
+  const FaceViews& f = ib.faces();
+  const auto start = on_host(f.start), cell = on_host(f.cell), owner = on_host(f.body);
+  const auto direction = on_host(f.direction), sign = on_host(f.sign);
+  int expected = 0;
+  for (int c = 0; c < grid.index.size(); ++c) {
+    if (kind(c) != NodeKind::fluid) continue;
+    for (int d = 0; d < 3; ++d) {
+      expected += (kind(c - grid.index.stride(d)) == NodeKind::immersed) +
+                  (kind(c + grid.index.stride(d)) == NodeKind::immersed);
+    }
+  }
+  REQUIRE(ib.counts().faces == expected);
+  REQUIRE(start(2) == expected);
+  std::map<std::pair<int, int>, int> seen;
+  for (int b = 0; b < 2; ++b) {
+    CHECK(start(b + 1) > start(b));
+    for (int e = start(b); e < start(b + 1); ++e) {
+      const int high = cell(e), low = high - grid.index.stride(direction(e));
+      const int fluid = sign(e) > 0 ? high : low, immersed = sign(e) > 0 ? low : high;
+      REQUIRE(kind(fluid) == NodeKind::fluid);
+      REQUIRE(kind(immersed) == NodeKind::immersed);
+      REQUIRE(body(immersed) == b);
+      REQUIRE(owner(e) == b);
+      REQUIRE(++seen[{high, direction(e)}] == 1);
+    }
+  }
+}

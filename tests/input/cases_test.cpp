@@ -1,0 +1,146 @@
+// The case files that come with the program, and the echo of what was read.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "core/error.hpp"
+#include "core/units.hpp"
+#include "input/case.hpp"
+
+using namespace corpuscle;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path cases = fs::path(CORPUSCLE_SOURCE_DIR) / "cases";
+
+Case read(const std::string& name, const std::vector<std::string>& overrides = {}) {
+  return read_case((cases / name).string(), overrides);
+}
+
+// The same but for where it was read from and the text of the echo.
+void require_same(const Case& a, const Case& b) {
+  REQUIRE(a.title == b.title);
+  REQUIRE(a.time == b.time);
+  REQUIRE(a.grid == b.grid);
+  REQUIRE(a.fluid == b.fluid);
+  REQUIRE(a.boundaries == b.boundaries);
+  REQUIRE(a.cells == b.cells);
+  REQUIRE(a.bodies == b.bodies);
+  REQUIRE(a.coupling == b.coupling);
+  REQUIRE(a.stretching == b.stretching);
+  REQUIRE(a.output == b.output);
+}
+
+Case read_echo(const Case& original) {
+  const auto path = fs::temp_directory_path() / "corpuscle_test_echo.toml";
+  std::ofstream(path) << original.resolved;
+  auto again = read_case(path.string());
+  fs::remove(path);
+  return again;
+}
+
+}  // namespace
+
+TEST_CASE("every case file reads, and its echo reads back to the same case") {
+  int found = 0;
+  for (const auto& entry : fs::directory_iterator(cases)) {
+    if (entry.path().extension() != ".toml") continue;
+    ++found;
+    INFO(entry.path());
+    const auto scene = read_case(entry.path().string());
+    const auto again = read_echo(scene);
+    require_same(scene, again);
+    REQUIRE(again.resolved == scene.resolved);
+  }
+  REQUIRE(found >= 6);
+}
+
+TEST_CASE("the echo keeps overrides, awkward texts and every kind of value") {
+  const auto scene =
+      read("straight_tube.toml",
+           {"title=\"a \\\"quoted\\\" \\\\ title\\n with two lines\"", "boundary.0.profile=table",
+            "boundary.0.radial_table=[[0, 2], [0.5, 1.5], [1, 0]]", "boundary.0.velocity_mm_per_s=1.23456789",
+            "cells.0.bending_modulus_J=1.7e-19", "cells.0.spin_deg=0.1", "fluid.convection=implicit",
+            "output.fields=[\"pressure\"]", "coupling.robin_coefficient_pg_per_um2_per_us=4.5"});
+  REQUIRE(scene.title == "a \"quoted\" \\ title\n with two lines");
+  REQUIRE(scene.coupling->robin_coefficient == 4.5);
+  REQUIRE_FALSE(scene.output.velocity);
+  REQUIRE(scene.output.pressure);
+  require_same(scene, read_echo(scene));
+}
+
+TEST_CASE("the stretching case names its experiment by a path that holds from anywhere") {
+  const auto scene = read("stretch.toml");
+  REQUIRE(scene.stretching->experiment == (cases / "mills2004.csv").lexically_normal().string());
+  REQUIRE(scene.stretching->force_pN == 200);
+  REQUIRE_FALSE(scene.fluid);
+  REQUIRE_FALSE(scene.grid);
+  REQUIRE_FALSE(scene.coupling);
+  REQUIRE_FALSE(scene.output.fields);
+  REQUIRE(scene.output.cells);
+}
+
+TEST_CASE("units of the case file become internal ones") {
+  const auto scene = read("straight_tube.toml");
+  REQUIRE(scene.grid->nodes == std::array{31, 31, 51});
+  const auto& inlet = scene.boundaries.at(0);
+  REQUIRE(inlet.type == BoundarySettings::Type::velocity_inlet);
+  REQUIRE(inlet.speed == 2e-3);  // um/us; 2 mm/s
+  REQUIRE_FALSE(inlet.velocity);
+  REQUIRE(inlet.ramp_us == 20);
+  // 2.4e-19 J in fJ, to rounding
+  REQUIRE(scene.cells.at(0).bending_modulus_fJ == Approx(2.4e-4).epsilon(1e-14));
+  REQUIRE(scene.coupling->scheme == CouplingSettings::Scheme::robin);
+
+  const auto wall = read("couette.toml").boundaries.at(1);
+  REQUIRE(wall.velocity.value() == Triple{2e-3, 0, 0});
+}
+
+TEST_CASE("a flow with cells but no [coupling] is coupled by robin") {
+  const auto path = fs::temp_directory_path() / "corpuscle_test_uncoupled.toml";
+  std::ifstream in(cases / "straight_tube.toml");
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  const auto start = text.find("[coupling]");
+  text.erase(start, text.find("[output]") - start);
+  std::ofstream(path) << text;
+  const auto scene = read_case(path.string());
+  fs::remove(path);
+  REQUIRE(scene.coupling->scheme == CouplingSettings::Scheme::robin);
+  REQUIRE(scene.coupling->robin_coefficient < 0);  // chosen from the grid
+}
+
+TEST_CASE("convection takes true, false and two words") {
+  using Convection = FluidSettings::Convection;
+  const auto with = [](const std::string& value) {
+    return read("tube_flow.toml", {"fluid.convection=" + value}).fluid->convection;
+  };
+  REQUIRE(with("true") == Convection::extrapolated);
+  REQUIRE(with("false") == Convection::none);
+  REQUIRE(with("extrapolated") == Convection::extrapolated);
+  REQUIRE(with("\"implicit\"") == Convection::implicit);
+  REQUIRE_THROWS_AS(with("explicit"), InputError);
+}
+
+TEST_CASE("the keys that scripts rely on can all be set") {
+  const auto scene = read("straight_tube.toml",
+                          {"time.step_us=2", "time.end_us=10", "grid.nodes=[21,22,23]", "fluid.density_pg_per_um3=1.1",
+                           "fluid.kinematic_viscosity_um2_per_us=0.9", "fluid.convection=false",
+                           "cells.0.vertices=1000", "cells.0.mass_pg=7200", "cells.0.reference=spontaneous-angle",
+                           "cells.0.interior=empty", "cells.0.shear_modulus_uN_per_m=5", "coupling.scheme=aitken",
+                           "coupling.tolerance=1e-4", "output.every_us=5", "output.fields=false"});
+  REQUIRE(scene.time.step_us == 2);
+  REQUIRE(scene.time.end_us == 10);
+  REQUIRE(scene.grid->nodes == std::array{21, 22, 23});
+  REQUIRE(scene.fluid->density_pg_per_um3 == 1.1);
+  REQUIRE(scene.fluid->kinematic_viscosity_um2_per_us == 0.9);
+  REQUIRE(scene.cells[0].vertices == 1000);
+  REQUIRE(scene.cells[0].mass_pg == 7200);
+  REQUIRE(scene.cells[0].reference == CellSettings::Reference::spontaneous_angle);
+  REQUIRE(scene.cells[0].shear_modulus_uN_per_m == 5);
+  REQUIRE(scene.coupling->scheme == CouplingSettings::Scheme::aitken);
+  REQUIRE(scene.coupling->tolerance == 1e-4);
+  REQUIRE(scene.output.every_us == 5);
+  REQUIRE_FALSE(scene.output.fields);
+}

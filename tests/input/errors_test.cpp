@@ -1,0 +1,305 @@
+// Every message about a wrong case file is provoked, and must name file, line, key, value and what is allowed.
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "core/error.hpp"
+#include "core/nearest.hpp"
+#include "input/case.hpp"
+
+using namespace corpuscle;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path cases = fs::path(CORPUSCLE_SOURCE_DIR) / "cases";
+
+// A complete flow case, short enough to count its lines; `@` marks where a test puts its own text.
+const std::string flow = R"([time]
+step_us = 1
+end_us = 10
+[grid]
+generator = "box"
+nodes = [5, 5, 5]
+lower_um = [0, 0, 0]
+upper_um = [4, 4, 4]
+[fluid]
+[[boundary]]
+side = "k_min"
+type = "velocity_inlet"
+velocity_mm_per_s = 2
+[[boundary]]
+side = "k_max"
+type = "outflow"
+[[boundary]]
+side = "i_min"
+type = "wall"
+[[boundary]]
+side = "i_max"
+type = "wall"
+[[boundary]]
+side = "j_min"
+type = "wall"
+[[boundary]]
+side = "j_max"
+type = "wall"
+)";
+
+std::string message(const std::string& text, const std::vector<std::string>& overrides = {}) {
+  const auto path = fs::temp_directory_path() / "corpuscle_wrong.toml";
+  std::ofstream(path) << text;
+  try {
+    read_case(path.string(), overrides);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+void require_parts(const std::string& found, const std::vector<std::string>& parts) {
+  INFO("message: " << found);
+  for (const auto& part : parts) REQUIRE_THAT(found, Catch::Contains(part));
+}
+
+}  // namespace
+
+TEST_CASE("the flow case that the other tests break is right") { REQUIRE(message(flow) == "accepted"); }
+
+TEST_CASE("wrong values: file, line, key, value and what is allowed") {
+  struct Row {
+    std::string from, to;
+    std::vector<std::string> parts;
+  };
+  const std::vector<Row> rows{
+      {"step_us = 1", "step_us = -1", {"wrong.toml:2: time.step_us = -1", "a number above 0"}},
+      {"step_us = 1", "step_us = \"1\"", {":2: time.step_us = ", "a number above 0"}},
+      {"step_us = 1", "step_us = nan", {":2: time.step_us = nan", "a number above 0"}},
+      {"step_us = 1", "step_us = 11", {":2: time.step_us = 11", "must not exceed end_us = 10"}},
+      {"nodes = [5, 5, 5]", "nodes = [5, 5]", {":6: grid.nodes", "three whole numbers", "from 4 to"}},
+      {"nodes = [5, 5, 5]", "nodes = [5, 5, 3]", {":6: grid.nodes", "from 4 to"}},
+      {"nodes = [5, 5, 5]", "nodes = [5, 5, 5.5]", {":6: grid.nodes", "three whole numbers"}},
+      {"lower_um = [0, 0, 0]", "lower_um = [0, 0]", {":7: grid.lower_um", "three numbers [x, y, z]"}},
+      {"upper_um = [4, 4, 4]", "upper_um = [4, 0, 4]", {":8: grid.upper_um", "must exceed lower_um = [0, 0, 0]"}},
+      {"\"box\"", "\"boxes\"", {":5: grid.generator = ", "one of \"box\"", "did you mean \"box\"?"}},
+      {"[fluid]", "[fluid]\ndensity_pg_per_um3 = 0", {":10: fluid.density_pg_per_um3 = 0", "above 0"}},
+      {"[fluid]", "[fluid]\nkinematic_viscosity_um2_per_us = -1", {":10: fluid.kinematic_viscosity_um2_per_us = -1"}},
+      {"[fluid]", "[fluid]\nconvection = 1", {":10: fluid.convection = 1", "\"extrapolated\" or \"implicit\""}},
+      {"[fluid]", "[fluid]\nmomentum_tolerance = 2", {":10: fluid.momentum_tolerance = 2", "from 1e-15 to 0.1"}},
+      {"[fluid]", "[fluid]\nmax_iterations = 1.5", {":10: fluid.max_iterations = 1.5", "a whole number from 1"}},
+      {"[fluid]",
+       "[fluid]\npressure_gradient_Pa_per_um = [0, 0, 1]",
+       {":10: fluid.pressure_gradient_Pa_per_um", "needs a pair of periodic sides"}},
+      {"velocity_mm_per_s = 2", "velocity_mm_per_s = true", {":13: boundary.0.velocity_mm_per_s = true", "mean speed"}},
+      {"velocity_mm_per_s = 2", "velocity_mm_per_s = [1, 2]", {":13: boundary.0.velocity_mm_per_s", "three numbers"}},
+      {"\"velocity_inlet\"", "\"inlet\"", {":12: boundary.0.type", "one of \"velocity_inlet\", \"outflow\""}},
+      {"[fluid]",
+       "[output]\nfields = [\"velocty\"]\n[fluid]",
+       {":10: output.fields", "\"velocity\", \"pressure\", \"kind\""}},
+      {"[fluid]", "[output]\ncells = true\n[fluid]", {":10: output.cells", "no [[cells]]"}},
+  };
+  for (const auto& row : rows) require_parts(message(replaced(flow, row.from, row.to)), row.parts);
+}
+
+TEST_CASE("unknown keys and sections are errors with the nearest known one") {
+  struct Row {
+    std::string from, to;
+    std::vector<std::string> parts;
+  };
+  const std::vector<Row> rows{
+      {"step_us", "setp_us", {":2: time.setp_us = 1", "unknown key", "did you mean 'step_us'?"}},
+      {"step_us", "step_ms", {":2: time.step_ms = 1", "did you mean 'step_us'?", "unit is part of the name"}},
+      {"velocity_mm_per_s",
+       "velocity_um_per_us",
+       {":13: boundary.0.velocity_um_per_us = 2", "did you mean 'velocity_mm_per_s'?", "unit is part of the name"}},
+      {"[fluid]", "[fluid]\nzzzz = 1", {":10: fluid.zzzz = 1", "known here: density_pg_per_um3"}},
+      {"generator", "generater", {":5: grid.generater", "did you mean 'generator'?"}},
+      {"[fluid]", "[fluids]", {":9: fluids", "unknown section", "did you mean 'fluid'?"}},
+      {"[time]", "tilte = \"x\"\n[time]", {":1: tilte", "unknown key", "did you mean 'title'?"}},
+      {"[time]", "title = 1\n[time]", {":1: title = 1", "a text in quotes"}},
+      {"[fluid]", "[[fluid]]", {":9: fluid", "write it as one section, [fluid]"}},
+      {"[fluid]", "[cells]\nvertices = 500\n[fluid]", {":9: cells", "[[cells]]"}},
+  };
+  for (const auto& row : rows) require_parts(message(replaced(flow, row.from, row.to)), row.parts);
+}
+
+TEST_CASE("missing keys and sections are named") {
+  struct Row {
+    std::string from, to;
+    std::vector<std::string> parts;
+  };
+  const std::vector<Row> rows{
+      {"end_us = 10\n", "", {":1: time.end_us: required key is missing", "a number above 0"}},
+      {"generator = \"box\"\n", "", {":4: grid.generator: required key is missing", "one of \"box\""}},
+      {"lower_um = [0, 0, 0]\n", "", {":4: grid.lower_um: required key is missing", "three numbers"}},
+      {"velocity_mm_per_s = 2\n", "", {":10: boundary.0.velocity_mm_per_s: required key is missing", "inward normal"}},
+      {"side = \"k_min\"\n", "", {":10: boundary.0.side: required key is missing"}},
+      {"[time]\nstep_us = 1\nend_us = 10\n", "", {"wrong.toml: section [time] is missing", "step_us and end_us"}},
+      {"[fluid]\n", "[fluid]\n[[cells]]\n", {":10: cells.0.center_um: required key is missing", "three numbers"}},
+      {"[fluid]\n", "[fluid]\n[[bodies]]\n", {":10: bodies.0.shape: required key is missing", "\"sphere\""}},
+      {"[fluid]\n", "", {":9: boundary", "need a [fluid]"}},
+  };
+  for (const auto& row : rows) require_parts(message(replaced(flow, row.from, row.to)), row.parts);
+  require_parts(message(""), {"wrong.toml: nothing to compute", "[fluid] or [stretching]"});
+}
+
+TEST_CASE("grid generators take their own keys only") {
+  const std::string box = "generator = \"box\"\nnodes = [5, 5, 5]\nlower_um = [0, 0, 0]\nupper_um = [4, 4, 4]";
+  const auto grid = [&](const std::string& text) { return message(replaced(flow, box, text)); };
+  const std::string swept = "generator = \"swept_tube\"\nnodes = [5, 5, 5]\ndiameter_um = 10\n";
+  require_parts(grid(box + "\ndiameter_um = 3"), {":9: grid.diameter_um = 3", "only generator = \"straight_tube\" or"});
+  require_parts(grid("generator = \"straight_tube\"\nnodes = [5, 5, 5]\ndiameter_um = 10"),
+                {":4: grid.length_um: required key is missing"});
+  require_parts(grid(swept + "length_um = 3\ncenterline = \"arc\""), {"grid.length_um = 3", "only generator"});
+  require_parts(grid(swept), {"grid.centerline: required key is missing", "\"helix\""});
+  require_parts(grid(swept + "centerline = \"spline\""), {"grid.points_um: required key is missing"});
+  require_parts(grid(swept + "centerline = \"spline\"\npoints_um = [[0, 0, 0], [0, 0, 1]]"),
+                {":9: grid.points_um", "3 or more rows"});
+  require_parts(grid(swept + "centerline = \"spline\"\npoints_um = [[0, 0, 0], [0, 0, 0], [0, 0, 1]]"),
+                {":9: grid.points_um", "points 0 and 1 coincide"});
+  require_parts(grid(swept + "centerline = \"arc\"\narc_angle_deg = 90\narc_radius_um = 4"),
+                {":10: grid.arc_radius_um = 4", "half the diameter, 5 um"});
+  require_parts(grid(swept + "centerline = \"arc\"\nhelix_turns = 2"),
+                {"grid.helix_turns = 2", "centerline = \"helix\""});
+  require_parts(grid("generator = \"file\"\nfile = \"no_such.h5\""),
+                {":6: grid.file", "no_such.h5", "there is no file"});
+  require_parts(grid("generator = \"file\"\nnodes = [5, 5, 5]"), {":6: grid.nodes", "the file decides"});
+}
+
+TEST_CASE("boundaries must make sense together") {
+  const auto with = [](const std::string& from, const std::string& to) { return message(replaced(flow, from, to)); };
+  require_parts(with("\"j_max\"", "\"j_min\""), {":27: boundary.5.side", "already has a [[boundary]] (boundary.4)"});
+  require_parts(with("[[boundary]]\nside = \"j_max\"\ntype = \"wall\"\n", ""),
+                {":10: boundary: ", "no [[boundary]] for j_max"});
+  require_parts(with("\"outflow\"", "\"wall\""), {":12: boundary.0.type", "no way out"});
+  require_parts(with("side = \"i_min\"\ntype = \"wall\"", "side = \"i_min\"\ntype = \"periodic\""),
+                {":19: boundary.2.type", "make i_max periodic as well"});
+  require_parts(with("type = \"outflow\"", "type = \"outflow\"\nramp_us = 3"),
+                {":17: boundary.1.ramp_us = 3", "change with time"});
+  require_parts(with("type = \"outflow\"", "type = \"outflow\"\nvelocity_mm_per_s = 3"),
+                {":17: boundary.1.velocity_mm_per_s = 3", "have a velocity"});
+  require_parts(with("type = \"outflow\"", "type = \"moving_wall\"\nvelocity_mm_per_s = 3"),
+                {":17: boundary.1.velocity_mm_per_s = 3", "three numbers"});
+  const std::string inlet = "velocity_mm_per_s = 2";
+  require_parts(with(inlet, inlet + "\nramp_us = 2\ntime_table = [[0, 0], [1, 1]]"),
+                {":14: boundary.0.ramp_us = 2", "not both"});
+  require_parts(with(inlet, inlet + "\ntime_table = [[1, 0], [1, 1]]"),
+                {":14: boundary.0.time_table", "times must rise"});
+  require_parts(with(inlet, inlet + "\nprofile = \"table\""), {"boundary.0.radial_table: required key is missing"});
+  require_parts(with(inlet, inlet + "\nradial_table = [[0, 2], [1, 0]]"),
+                {":14: boundary.0.radial_table", "profile = \"table\""});
+  require_parts(with(inlet, inlet + "\nprofile = \"table\"\nradial_table = [[0, 2], [2, 0]]"),
+                {":15: boundary.0.radial_table", "at most 1"});
+  require_parts(with(inlet, "velocity_mm_per_s = [0, 0, 2]\nprofile = \"parabolic\""),
+                {":14: boundary.0.profile", "give a mean speed"});
+  auto tube = replaced(flow, "\"box\"", "\"straight_tube\"");
+  tube = replaced(tube, "lower_um = [0, 0, 0]\nupper_um = [4, 4, 4]", "diameter_um = 10\nlength_um = 20");
+  require_parts(message(replaced(tube, "side = \"i_min\"\ntype = \"wall\"", "side = \"i_min\"\ntype = \"symmetry\"")),
+                {":19: boundary.2.type", "part of the tube's wall"});
+}
+
+TEST_CASE("cells and bodies are checked") {
+  const auto cell = [](const std::string& text) {
+    return message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [2, 2, 2]\n" + text + "\n"));
+  };
+  REQUIRE(cell("") == "accepted");
+  require_parts(cell("vertices = 199"), {":12: cells.0.vertices = 199", "from 200 to 30000"});
+  require_parts(cell("vertices = 30001"), {":12: cells.0.vertices = 30001", "from 200 to 30000"});
+  require_parts(cell("vertices = 500.5"), {":12: cells.0.vertices = 500.5", "a whole number"});
+  require_parts(cell("mass_pg = 0"), {":12: cells.0.mass_pg = 0", "above 0"});
+  require_parts(cell("mass_kg = 1e-13"), {":12: cells.0.mass_kg", "did you mean 'mass_pg'?", "convert"});
+  require_parts(cell("shear_modulus_uN_per_m = 0"), {":12: cells.0.shear_modulus_uN_per_m = 0", "above 0"});
+  require_parts(cell("local_area_modulus_uN_per_m = 0"), {":12: cells.0.local_area_modulus_uN_per_m = 0", "ill-posed"});
+  require_parts(cell("axis = [0, 0, 0]"), {":12: cells.0.axis", "must not be zero"});
+  require_parts(cell("interior = \"cytosol\""), {":12: cells.0.interior", "does not exist yet", "\"empty\""});
+  require_parts(cell("reference = \"shapes\""), {":12: cells.0.reference", "did you mean \"shape\"?"});
+  require_parts(cell("mesh = \"missing.off\""), {":12: cells.0.mesh", "there is no file", "missing.off"});
+  const auto mesh = (cases / "mills2004.csv").string();
+  require_parts(cell("mesh = \"" + mesh + "\""), {":12: cells.0.mesh", "OFF or STL"});
+  require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"aitken\", \"loose\""});
+  require_parts(cell("[coupling]\ntolerance = 1"), {":13: coupling.tolerance = 1", "from 1e-12 to 0.5"});
+  require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
+
+  const auto body = [](const std::string& text) {
+    return message(replaced(flow, "[fluid]\n", "[fluid]\n[[bodies]]\ncenter_um = [2, 2, 2]\n" + text + "\n"));
+  };
+  REQUIRE(body("shape = \"sphere\"\nradius_um = 1") == "accepted");
+  require_parts(body("shape = \"sphere\""), {":10: bodies.0.radius_um: required key is missing"});
+  require_parts(body("shape = \"sphere\"\nradius_um = 1\nsemi_axes_um = [1, 1, 1]"),
+                {":14: bodies.0.semi_axes_um", "shape = \"ellipsoid\""});
+  require_parts(body("shape = \"ellipsoid\"\nsemi_axes_um = [1, 1, -1]"),
+                {":13: bodies.0.semi_axes_um", "each a number above 0"});
+  require_parts(body("shape = \"sphere\"\nradius_um = 1\nvertices = 5"), {":14: bodies.0.vertices = 5", "42"});
+  require_parts(body("shape = \"sphere\"\nradius_um = 1\nvelocity_um_per_us = [0, 0, 1]"),
+                {":14: bodies.0.velocity_um_per_us", "did you mean 'velocity_mm_per_s'?"});
+  require_parts(body("shape = \"sphere\"\nradius_um = 1\n[coupling]"), {":14: coupling: there are no [[cells]]"});
+}
+
+TEST_CASE("modules that contradict each other are refused") {
+  require_parts(message(flow + "[[cells]]\ncenter_um = [0, 0, 0]\n[stretching]\n"),
+                {":9: fluid: a stretching test has no fluid"});
+  require_parts(message("[stretching]\n"), {":1: stretching: a stretching test pulls one cell; the case has 0"});
+  require_parts(message("[[cells]]\n[stretching]\n[time]\nstep_us = 1\nend_us = 1\n"), {":3: time: ", "has no [time]"});
+  require_parts(message("[[cells]]\n[stretching]\nforce_N = 1\n"), {":3: stretching.force_N", "'force_pN'"});
+  require_parts(message("[[cells]]\n[stretching]\npatch_fraction = 0.6\n"), {":3: stretching.patch_fraction = 0.6"});
+  require_parts(message("[[cells]]\n[stretching]\n[output]\nfields = true\n"),
+                {":4: output.fields = true", "no [fluid]"});
+  require_parts(message("[[cells]]\n"), {":1: cells: nothing to compute"});
+  require_parts(message("[[bodies]]\nshape = \"sphere\"\nradius_um = 1\ncenter_um = [0, 0, 0]\n"),
+                {":1: bodies: rigid bodies need a [fluid]"});
+  require_parts(message("[grid]\ngenerator = \"box\"\nnodes = [5, 5, 5]\nlower_um = [0, 0, 0]\nupper_um = [1, 1, 1]\n"),
+                {":1: grid: a grid without a [fluid]"});
+  require_parts(message("[time]\nstep_us = 1\nend_us = 1\n[fluid]\n"), {":4: fluid: a fluid needs a [grid]"});
+}
+
+TEST_CASE("overrides that are wrong say so") {
+  const auto set = [](const std::string& text) { return message(flow, {text}); };
+  require_parts(set("time.step_us=-3"), {"--set time.step_us=-3: time.step_us = -3", "above 0"});
+  require_parts(set("time.step_us"), {"--set time.step_us: write section.key=value"});
+  require_parts(set("=3"), {"--set =3: write section.key=value"});
+  require_parts(set("time..step_us=3"), {"write section.key=value"});
+  require_parts(set("time.step_us="), {"--set time.step_us=: no value"});
+  require_parts(set("step_us=3"), {"there is no section 'step_us'"});
+  require_parts(set("tme.step_us=3"), {"there is no section 'tme'", "did you mean 'time'?"});
+  require_parts(set("time.stp_us=3"), {"--set time.stp_us=3: time.stp_us = 3", "did you mean 'step_us'?"});
+  require_parts(set("boundary.side=k_min"), {"write boundary.0.key=value"});
+  require_parts(set("boundary.x.side=k_min"), {"'x' is not the number of an entry"});
+  require_parts(set("boundary.6.side=k_min"), {"the case has 6 [[boundary]], counted from 0"});
+  require_parts(set("cells.0.vertices=500"), {"the case has 0 [[cells]]"});
+  require_parts(set("grid.nodes=[5,5"), {"--set grid.nodes=[5,5: the value is not valid TOML"});
+  require_parts(set("grid.nodes.0=5"), {"write grid.key=value"});
+  require_parts(set("grid.generator=bxo"), {"--set grid.generator=bxo: grid.generator", "did you mean \"box\"?"});
+  require_parts(set("output.every_us=ten"), {"--set output.every_us=ten", "a number, 0 or more"});
+}
+
+TEST_CASE("files that are not case files are refused") {
+  require_parts(message("[time\nstep_us = 1"), {"wrong.toml:1: not valid TOML"});
+  require_parts(message("[time]\nstep_us = 1\nstep_us = 2"), {"wrong.toml:3: not valid TOML"});
+  const auto refused = [](const std::string& path) -> std::string {
+    try {
+      read_case(path);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  require_parts(refused("/no/such/case.toml"), {"/no/such/case.toml: cannot read"});
+  require_parts(refused(cases.string()), {cases.string() + ": is a folder"});
+}
+
+TEST_CASE("suggestions: the unit first, then the spelling, and none for what is alike to nothing") {
+  const std::vector<std::string> known{"velocity_mm_per_s", "vertices", "mass_pg"};
+  REQUIRE(nearest("velocity_um_per_us", known) == "velocity_mm_per_s");
+  REQUIRE(nearest("velocity", known) == "velocity_mm_per_s");
+  REQUIRE(nearest("vertexes", known) == "vertices");
+  REQUIRE(nearest("quantum", known) == "");
+  REQUIRE(without_unit("density_pg_per_um3") == "density");
+  REQUIRE(without_unit("bending_modulus_J") == "bending_modulus");
+  REQUIRE(edit_distance("abcd", "abdc") == 1);
+  REQUIRE(edit_distance("", "abc") == 3);
+}

@@ -1,0 +1,209 @@
+#include "membrane/forces.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "core/error.hpp"
+#include "core/units.hpp"
+#include "membrane/diagnostics.hpp"
+#include "membrane/membrane_setup.hpp"
+#include "membrane_fixture.hpp"
+
+using namespace corpuscle;
+using namespace corpuscle::testing;
+
+namespace {
+
+enum class Term { springs, bending, global_area, local_area, volume, all };
+
+CellLaw only(Term term, const CellLaw& law) {
+  if (term == Term::all) return law;
+  CellLaw one = law;
+  if (term != Term::springs) one.spring.stiffness = 0;
+  if (term != Term::bending) one.bending = 0;
+  if (term != Term::global_area) one.area = 0;
+  if (term != Term::local_area) one.local_area = 0;
+  if (term != Term::volume) one.volume = 0;
+  return one;
+}
+
+/// One deformed cell with one term of the energy or all.
+struct OneCell {
+  OneCell(const CellSettings& settings, Term term) {
+    CellReference reference = make_reference(settings);
+    reference.law = only(term, reference.law);
+    views = make_membrane_views(make_surface_set({reference.mesh}), {reference}, {0});
+    table = Table<double>("corpuscle::test::table", 1, CellColumn::count);
+    x = deformed(to_host(views.surface.x, views.vertices), 0.03);
+    to_device(x, views.surface.x);
+  }
+
+  double energy() {
+    measure_cells(views, table);
+    const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
+    double sum = 0;
+    for (int c = CellColumn::springs; c <= CellColumn::global_volume; ++c) sum += host(0, c);
+    return sum;
+  }
+
+  double energy_at(int vertex, int d, double shift) {
+    const auto position = Kokkos::subview(views.surface.x, vertex, d);
+    Kokkos::deep_copy(position, x[vertex][d] + shift);
+    const double e = energy();
+    Kokkos::deep_copy(position, x[vertex][d]);
+    return e;
+  }
+
+  MembraneViews views;
+  Table<double> table;
+  std::vector<Vec3> x;
+};
+
+}  // namespace
+
+TEST_CASE("every force is minus the gradient of its energy") {
+  const auto term =
+      GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
+  CellSettings settings = cell_settings(300);
+  settings.reference = GENERATE(CellSettings::Reference::shape, CellSettings::Reference::uniform);
+  OneCell cell(settings, term);
+  membrane_forces(cell.views, cell.views.surface.x, cell.views.force);
+  const auto force = to_host(cell.views.force, cell.views.vertices);
+  const double h = 1e-3;  // um; the fourth-order difference leaves h^4 = 1e-12, rounding of the energy 1e-13 / h
+  double error2 = 0, scale2 = 0;
+  for (int vertex = 0; vertex < cell.views.vertices; vertex += 17) {
+    for (int d = 0; d < 3; ++d) {
+      const double inner = cell.energy_at(vertex, d, h) - cell.energy_at(vertex, d, -h);
+      const double outer = cell.energy_at(vertex, d, 2 * h) - cell.energy_at(vertex, d, -2 * h);
+      const double slope = (8 * inner - outer) / (12 * h);
+      error2 += (slope + force[vertex][d]) * (slope + force[vertex][d]);
+      scale2 += slope * slope;
+    }
+  }
+  const double error = std::sqrt(error2 / scale2);
+  INFO("term " << int(term) << ": relative error " << error);
+  CHECK(scale2 > 0);
+  CHECK(error < 1e-6);  // the bound asked for
+  report("term {}: relative error {:.1e}", int(term), error);
+}
+
+TEST_CASE("internal forces of a deformed cell exert no net force or torque") {
+  const auto term =
+      GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
+  OneCell cell(cell_settings(500), term);
+  membrane_forces(cell.views, cell.views.surface.x, cell.views.force);
+  const auto force = to_host(cell.views.force, cell.views.vertices);
+  Vec3 net, torque;
+  double force_sum = 0, torque_sum = 0;
+  for (std::size_t i = 0; i < force.size(); ++i) {
+    net += force[i];
+    torque += cross(cell.x[i], force[i]);
+    force_sum += norm(force[i]);
+    torque_sum += norm(cell.x[i]) * norm(force[i]);
+  }
+  CHECK(force_sum > 0);
+  CHECK(norm(net) < 1e-12 * force_sum);  // the bound asked for
+  CHECK(norm(torque) < 1e-12 * torque_sum);
+  report("term {}: net force {:.1e}, net torque {:.1e} of the sums of magnitudes", int(term), norm(net) / force_sum,
+         norm(torque) / torque_sum);
+}
+
+TEST_CASE("the reference shape is free of force") {
+  Membranes membranes({cell_settings(500)});
+  membranes.compute_forces();
+  // Single links carry about 0.004 nN; what is left is rounding.
+  for (const Vec3& f : to_host(membranes.views().force, membranes.vertices())) REQUIRE(norm(f) < 1e-13);
+  const auto d = membranes.diagnostics()[0];
+  CHECK(d.bending_fJ == Approx(0).margin(1e-15));
+  CHECK(d.local_area_fJ == Approx(0).margin(1e-20));
+  CHECK(d.stretch == Approx(1 / 2.2));
+}
+
+TEST_CASE("the shear modulus of a flat hexagonal patch is the one asked for") {
+  const double asked = GENERATE(6.32, 4.0);
+  CellSettings settings = cell_settings(200);
+  settings.shear_modulus_uN_per_m = asked;
+  const CellLaw law = make_reference(settings).law;
+  const double edge = 0.5, strain = 1e-4;
+  for (double turn : {0.0, 0.2, 0.5}) {
+    // Six triangles around a vertex, sheared by `strain` along x; the lattice may lie at any angle.
+    const double height = std::sqrt(3.0) / 2 * edge;
+    TriangleRest rest{{edge, edge, edge}, {1, 1, 1}, {0, 0, 0}, 0.5 * edge * height};
+    double stress = 0, area = 0;
+    for (int t = 0; t < 6; ++t) {
+      TriangleState state;
+      const auto ring = [&](int k) {
+        const double phi = turn + k * 60 * units::degree;
+        return Vec3{edge * (std::cos(phi) + strain * std::sin(phi)), edge * std::sin(phi), 0};
+      };
+      state.corner[1] = ring(t);
+      state.corner[2] = ring(t + 1);
+      state.normal = {0, 0, 1};
+      for (Vec3& n : state.other_normal) n = {0, 0, 1};
+      state.area = rest.area;
+      Vec3 force[3];
+      triangle_forces(state, rest, law, {0, 0}, force);
+      // Virial stress of the triangle's forces on its own corners.
+      for (int k = 0; k < 3; ++k) stress -= force[k].x * state.corner[k].y;
+      area += state.area;
+    }
+    const double modulus = stress / area / strain;
+    CHECK(modulus == Approx(asked * units::uN_per_m).epsilon(0.01));  // the bound asked for
+    report("shear modulus error {:.1e}", modulus / (asked * units::uN_per_m) - 1);
+  }
+}
+
+TEST_CASE("spring law") {
+  const SpringLaw law{3.7e-3};
+  CHECK(wlc_force(0.5, 0.5, law) == Approx(0).margin(1e-18));
+  CHECK(wlc_force(0.6, 0.5, law) > 0);
+  CHECK(wlc_force(0.4, 0.5, law) < 0);
+  // Equation 5 written out at x = 0.8, rest length 1: kT/p [1/(4 0.04) - 1/4 + 0.8] - k_p / l^2.
+  const double l = 0.8 * 2.2, at_rest = 0.25 / std::pow(1 - 1 / 2.2, 2) - 0.25 + 1 / 2.2;
+  CHECK(wlc_force(l, 1, law) == Approx(3.7e-3 * (6.25 + 0.55 - at_rest / (l * l))).epsilon(1e-12));
+  CHECK(std::isfinite(wlc_force(5, 1, law)));  // beyond the contour length
+}
+
+TEST_CASE("signed dihedral angle") {
+  const Vec3 up{0, 0, 1}, along{0, 1, 0};
+  const Dihedral convex = dihedral(up, {0.6, 0, 0.8}, along);  // the right-hand neighbour falls away
+  CHECK(convex.sine == Approx(0.6));
+  CHECK(convex.cosine == Approx(0.8));
+  CHECK(dihedral(up, {-0.6, 0, 0.8}, along).sine == Approx(-0.6));
+  // A biconcave cell has edges of both signs, and its spontaneous angle from Equation 13 is convex.
+  const CellReference r = make_reference(cell_settings(500));
+  double lowest = 0, highest = 0;
+  for (const auto& a : r.rest_angle) {
+    for (double angle : a) lowest = std::min(lowest, angle), highest = std::max(highest, angle);
+  }
+  CHECK(lowest < -1 * units::degree);
+  CHECK(highest > 20 * units::degree);
+}
+
+TEST_CASE("reference states") {
+  CellSettings settings = cell_settings(500);
+  const CellReference shape = make_reference(settings);
+  settings.reference = CellSettings::Reference::spontaneous_angle;
+  const CellReference angle = make_reference(settings);
+  settings.reference = CellSettings::Reference::uniform;
+  const CellReference uniform = make_reference(settings);
+  CHECK(shape.law.rest_area == Approx(area(shape.mesh)));
+  CHECK(angle.rest_length == shape.rest_length);
+  // Equation 13 by hand for 500 vertices: arccos((862.56 - 15.708) / (862.56 - 9.4248)).
+  CHECK(angle.rest_angle[7][1] / units::degree == Approx(6.958).margin(0.001));
+  CHECK(uniform.rest_angle == angle.rest_angle);
+  CHECK(uniform.law.rest_area == 135);
+  CHECK(uniform.law.rest_volume == 94);
+  CHECK(uniform.rest_length[0] == uniform.rest_length[500]);
+}
+
+TEST_CASE("constants out of range are refused") {
+  CellSettings s = cell_settings(200);
+  const auto refused = [&](const std::string& key) {
+    CHECK_THROWS_WITH(make_reference(s), Catch::Matchers::Contains("cells." + key));
+    s = cell_settings(200);
+  };
+  s.local_area_modulus_uN_per_m = 0, refused("local_area_modulus_uN_per_m");
+  s.mass_pg = 0, refused("mass_pg");
+  s.shear_modulus_uN_per_m = -1, refused("shear_modulus_uN_per_m");
+  s.membrane_viscosity_N_s_per_m = NAN, refused("membrane_viscosity_N_s_per_m");
+}

@@ -1,0 +1,72 @@
+// Shared by the membrane tests: positions in and out of the device, fixed random numbers.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+#include <vector>
+
+#include "membrane/membranes.hpp"
+
+namespace corpuscle::testing {
+
+/// Print a measured figure if CORPUSCLE_SHOW is set in the environment.
+template <class... Values>
+void report(fmt::format_string<Values...> text, Values&&... values) {
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format(text, std::forward<Values>(values)...));
+}
+
+inline CellSettings cell_settings(int vertices, double mass_pg = 100) {
+  CellSettings cell;
+  cell.vertices = vertices;
+  cell.mass_pg = mass_pg;
+  return cell;
+}
+
+/// The first `rows` rows of a [row, 3] view on the host.
+inline std::vector<Vec3> to_host(const Components<double>& view, int rows) {
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
+  std::vector<Vec3> values;
+  for (int i = 0; i < rows; ++i) values.push_back(load(host, i));
+  return values;
+}
+
+inline void to_device(const std::vector<Vec3>& values, const Components<double>& view) {
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
+  for (std::size_t i = 0; i < values.size(); ++i) store(host, int(i), values[i]);
+  Kokkos::deep_copy(view, host);
+}
+
+inline Components<double> make_field(const std::vector<Vec3>& values) {
+  Components<double> view("corpuscle::test::field", values.size(), 3);
+  to_device(values, view);
+  return view;
+}
+
+/// Uniform in [-1, 1] and the same on every platform.
+class Noise {
+ public:
+  double operator()() { return 2 * (double(engine_()) / 4294967295.0) - 1; }
+  Vec3 vec() {
+    const double a = (*this)(), b = (*this)(), c = (*this)();
+    return {a, b, c};
+  }
+
+ private:
+  std::mt19937 engine_{20210406};
+};
+
+/// A cell stretched, sheared and shaken: no symmetry left, every term at work, no link near its limit.
+inline std::vector<Vec3> deformed(const std::vector<Vec3>& rest, double noise_um) {
+  Noise noise;
+  std::vector<Vec3> x = rest;
+  for (Vec3& p : x) {
+    p = Vec3{1.08 * p.x + 0.1 * p.y, 0.97 * p.y + 0.05 * p.z, 1.05 * p.z + 0.02 * p.x * p.y} + noise_um * noise.vec();
+  }
+  return x;
+}
+
+}  // namespace corpuscle::testing
