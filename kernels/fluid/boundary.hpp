@@ -17,13 +17,18 @@ void fill_outflow(const IndexSpace& index, const CellBox& side, int inward_offse
 }
 
 /// No flow through the side and no shear on it: the normal part of the neighbouring velocity is taken out. `area` are
-/// the face area vectors normal to the side, and `area_offset` leads from a boundary node to its face.
+/// the face area vectors normal to the side, and `area_offset` leads from a boundary node to its face; nodes on the
+/// block's edges, whose own face is a line, take the normal of the nearest node of `faces`.
 template <class Velocity>
-void fill_symmetry(const IndexSpace& index, const CellBox& side, int inward_offset, int area_offset,
-                   const Components<double>& area, const Velocity& u) {
+void fill_symmetry(const IndexSpace& index, const CellBox& side, const CellBox& faces, int inward_offset,
+                   int area_offset, const Components<double>& area, const Velocity& u) {
+  const int lx = faces.lower[0], ly = faces.lower[1], lz = faces.lower[2];
+  const int ux = faces.upper[0] - 1, uy = faces.upper[1] - 1, uz = faces.upper[2] - 1;
   for_box("corpuscle::fluid::symmetry", side.lower, side.upper, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const Vec3 s = load(area, c + area_offset), inner = load(u, c + inward_offset);
+    const int f = index.cell(i < lx ? lx : (i > ux ? ux : i), j < ly ? ly : (j > uy ? uy : j),
+                             k < lz ? lz : (k > uz ? uz : k));
+    const Vec3 s = load(area, f + area_offset), inner = load(u, c + inward_offset);
     const double square = dot(s, s);
     store(u, c, square > 0 ? inner - (dot(inner, s) / square) * s : inner);
   });

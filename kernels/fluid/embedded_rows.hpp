@@ -1,4 +1,4 @@
-// Immersed nodes inside the flow solver: their rows in the momentum system, and the flux that compatibility demands
+// Immersed nodes inside the flow solver: their part of the momentum operator, and the flux that compatibility demands
 // through the faces around each body.
 #pragma once
 
@@ -8,32 +8,13 @@
 
 namespace corpuscle {
 
-/// out = u_row - sum of weight u[column], in the compact order of the momentum operator.
-inline void apply_embedded_rows(const IndexSpace& index, const EmbeddedBodies& b, const Components<double>& u,
-                                const Array<double>& out) {
-  const int owned = index.owned();
+/// u_row = sum of weight u[column]: the rows' part of the linear operator, with the surface at rest.
+inline void apply_homogeneous_rows(const EmbeddedBodies& b, const Components<double>& u) {
   const StencilViews row = b.velocity;
-  Kokkos::parallel_for("corpuscle::immersed::rows", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
-    const int c = row.node(r);
-    int i, j, k;
-    index.unpack(c, i, j, k);
-    const int e = index.compact(i, j, k);
-    Vec3 sum = load(u, c);
-    for (int n = 0; n < row.columns(r); ++n) sum -= row.weight(r, n) * load(u, row.column(r, n));
-    for (int m = 0; m < 3; ++m) out(e + m * owned) = sum[m];
-  });
-}
-
-/// rhs of those rows: the surface's part.
-inline void embedded_rhs(const IndexSpace& index, const EmbeddedBodies& b, const Array<double>& rhs) {
-  const int owned = index.owned();
-  const StencilViews row = b.velocity;
-  const auto u_surface = b.u_surface;
-  Kokkos::parallel_for("corpuscle::immersed::rhs", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
-    int i, j, k;
-    index.unpack(row.node(r), i, j, k);
-    const int e = index.compact(i, j, k);
-    for (int m = 0; m < 3; ++m) rhs(e + m * owned) = row.surface_weight(r) * u_surface(r, m);
+  Kokkos::parallel_for("corpuscle::immersed::homogeneous_rows", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
+    Vec3 sum;
+    for (int n = 0; n < row.columns(r); ++n) sum += row.weight(r, n) * load(u, row.column(r, n));
+    store(u, row.node(r), sum);
   });
 }
 

@@ -96,13 +96,14 @@ void subtract_viscous(const GridViews& grid, const ViscousCoefficients& g, const
 }
 
 /// force [body, 3] = pressure and viscous force that the fluid puts on each body through the faces around it, nN: what
-/// leaves the fluid's momentum balance there. The pressure on a face is that of the fluid node, extended along the
+/// leaves the fluid's momentum balance there. `gradient` is the imposed part of the pressure's. The pressure on a face is that of the fluid node, extended along the
 /// face's direction where the next node has one.
 template <bool skewed>
 void momentum_balance(const GridViews& grid, const ViscousCoefficients& g, const Array<unsigned char>& mask, double mu,
-                      const Components<double>& u, const Array<double>& p, const EmbeddedBodies& b,
-                      const Table<double>& force) {
+                      const Vec3& gradient, const Components<double>& u, const Array<double>& p,
+                      const EmbeddedBodies& b, const Table<double>& force) {
   const IndexSpace index = grid.index;
+  const auto x = grid.x;
   const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
   const FaceViews face = b.faces;
   const auto start = face.start;
@@ -118,7 +119,9 @@ void momentum_balance(const GridViews& grid, const ViscousCoefficients& g, const
               [&](int n, double& sum) {
                 const int d = face.direction(n), c = face.cell(n), stride = index.stride(d), sign = face.sign(n);
                 const int fluid = sign > 0 ? c : c - stride, beyond = fluid + sign * stride;
-                const double p_face = mask(beyond) ? p(fluid) + 0.5 * (p(fluid) - p(beyond)) : p(fluid);
+                const Vec3 at = 0.5 * (load(x, c) + load(x, c - stride));
+                const double p_face =
+                    (mask(beyond) ? p(fluid) + 0.5 * (p(fluid) - p(beyond)) : p(fluid)) + dot(gradient, at);
                 const double s = (d == 0 ? area0 : (d == 1 ? area1 : area2))(c, m);
                 sum += sign * (mu * viscous_face<skewed>(g, u, index, d, c, m) - p_face * s);
               },

@@ -35,7 +35,7 @@ void viscous_coefficients(const GridViews& grid, const ViscousCoefficients& g) {
       }
       const Vec3 f = face_coefficients(x, load(area, c), index, d, c);
       normal(c) = f[d];
-      if (skewed) {  // not constexpr, here and below: device lambdas must not capture first inside one
+      if (skewed) {  // not constexpr: a device lambda must not capture anything first inside one
         cross0(c) = f[(d + 1) % 3];
         cross1(c) = f[(d + 2) % 3];
       }
@@ -75,6 +75,61 @@ KOKKOS_INLINE_FUNCTION double viscous_face(const ViscousCoefficients& g, const V
   return flux;
 }
 
+/// Viscous forces on one cell of a skewed grid, over mu, as weights on the 19 nodes around it: its six face fluxes
+/// collected node by node, which reads each velocity once where the faces would read it up to ten times.
+struct ViscousStencil {
+  double centre = 0;
+  double axis[3][2];  // [direction][low, high]
+  double edge[3][4];  // [p][a + 2 b]: along direction p (low, high: a = 0, 1) and along p + 1 (b)
+
+  KOKKOS_INLINE_FUNCTION ViscousStencil(const ViscousCoefficients& g, const IndexSpace& index, int c) {
+    for (int d = 0; d < 3; ++d) {
+      const int next = c + index.stride(d), e = (d + 1) % 3, f = (d + 2) % 3;
+      const int next_e = c + index.stride(e), next_f = c + index.stride(f);
+      // Faces of the other two directions carry tangential differences along d.
+      const double tangential = 0.25 * (g.cross[e][d](next_e) - g.cross[e][d](c) + g.cross[f][d](next_f) -
+                                        g.cross[f][d](c));
+      axis[d][0] = g.normal[d](c) - tangential;
+      axis[d][1] = g.normal[d](next) + tangential;
+      centre -= g.normal[d](c) + g.normal[d](next);
+      const double of_d[2] = {g.cross[d][e](c), g.cross[d][e](next)};
+      const double of_e[2] = {g.cross[e][d](c), g.cross[e][d](next_e)};
+      for (int b = 0; b < 2; ++b)
+        for (int a = 0; a < 2; ++a) edge[d][a + 2 * b] = (a == b ? 0.25 : -0.25) * (of_d[a] + of_e[b]);
+    }
+  }
+
+  template <class Velocity>
+  KOKKOS_INLINE_FUNCTION double apply(const Velocity& u, const IndexSpace& index, int c, int m) const {
+    double sum = centre * u(c, m);
+    for (int d = 0; d < 3; ++d) {
+      const int s = index.stride(d), t = index.stride((d + 1) % 3);
+      sum += axis[d][0] * u(c - s, m) + axis[d][1] * u(c + s, m);
+      sum += edge[d][0] * u(c - s - t, m) + edge[d][1] * u(c + s - t, m) + edge[d][2] * u(c - s + t, m) +
+             edge[d][3] * u(c + s + t, m);
+    }
+    return sum;
+  }
+};
+
+/// Viscous forces on cell c over mu, all three components.
+template <bool skewed, class Velocity>
+KOKKOS_INLINE_FUNCTION Vec3 viscous_force(const ViscousCoefficients& g, const Velocity& u, const IndexSpace& index,
+                                          int c) {
+  Vec3 force;
+  if constexpr (skewed) {
+    const ViscousStencil stencil(g, index, c);
+    force = {stencil.apply(u, index, c, 0), stencil.apply(u, index, c, 1), stencil.apply(u, index, c, 2)};
+  } else {
+    for (int d = 0; d < 3; ++d) {
+      const int s = index.stride(d);
+      const double high = g.normal[d](c + s), low = g.normal[d](c);
+      force += high * (load(u, c + s) - load(u, c)) - low * (load(u, c) - load(u, c - s));
+    }
+  }
+  return force;
+}
+
 /// Convective transport of component m through the face, with the volume flux F: central.
 template <class Velocity>
 KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, NodeKind low_kind, NodeKind kind, int low,
@@ -86,7 +141,7 @@ KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, No
 
 /// out = D^-1 A u on owned cells, compact order with component m at offset m * owned.
 ///  fluid:    mass V u - mu (viscous fluxes) [+ rho (convective fluxes with the given face fluxes)]
-///  others:   u (immersed rows are replaced afterwards, blanked ones stay)
+///  others:   0 (immersed velocities are eliminated: u holds what their rows make of the fluid's)
 template <bool skewed, bool convective, class Velocity>
 void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
                     const Array<double>& diagonal, double mass, double mu, double rho, const Array<double> (&flux)[3],
@@ -98,18 +153,17 @@ void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const A
   for_owned("corpuscle::fluid::momentum_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k), e = index.compact(i, j, k);
     if (kind(c) != NodeKind::fluid) {
-      for (int m = 0; m < 3; ++m) out(e + m * owned) = u(c, m);
+      for (int m = 0; m < 3; ++m) out(e + m * owned) = 0;
       return;
     }
     const double inertia = mass * volume(c), scale = 1 / diagonal(c);
+    const Vec3 viscous = viscous_force<skewed>(g, u, index, c);
     for (int m = 0; m < 3; ++m) {
-      double sum = inertia * u(c, m);
-      for (int d = 0; d < 3; ++d) {
-        const int next = c + index.stride(d);
-        sum -= mu * (viscous_face<skewed>(g, u, index, d, next, m) - viscous_face<skewed>(g, u, index, d, c, m));
-        if (convective) {
+      double sum = inertia * u(c, m) - mu * viscous[m];
+      if (convective) {  // not constexpr, as above
+        for (int d = 0; d < 3; ++d) {
           const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
-          const int low = c - index.stride(d);
+          const int next = c + index.stride(d), low = c - index.stride(d);
           sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
                         convective_face(u, f(c), kind(low), kind(c), low, c, m));
         }
@@ -164,10 +218,10 @@ inline void subtract_convection(const GridViews& grid, const Array<NodeKind>& ki
   });
 }
 
-/// rhs = D^-1 (history - V grad p) at fluid nodes, the blanked nodes' own velocity elsewhere (immersed rows follow).
+/// rhs = D^-1 (history - V grad p) at fluid nodes, zero elsewhere.
 inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, const Array<double>& diagonal,
                          const Components<double>& history, const Components<double>& grad_p,
-                         const Components<double>& u, const Array<double>& rhs) {
+                         const Array<double>& rhs) {
   const IndexSpace index = grid.index;
   const auto volume = grid.volume;
   const int owned = index.owned();
@@ -176,7 +230,7 @@ inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, con
     const bool fluid = kind(c) == NodeKind::fluid;
     const double scale = 1 / diagonal(c);
     for (int m = 0; m < 3; ++m)
-      rhs(e + m * owned) = fluid ? scale * (history(c, m) - volume(c) * grad_p(c, m)) : u(c, m);
+      rhs(e + m * owned) = fluid ? scale * (history(c, m) - volume(c) * grad_p(c, m)) : 0.0;
   });
 }
 

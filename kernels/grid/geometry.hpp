@@ -4,6 +4,8 @@
 #include "common/vec3.hpp"
 #include "grid/grid_views.hpp"
 
+#include <cfloat>
+
 namespace corpuscle {
 
 /// Indexing of the nodes of a padded block: cell (i, j, k) has the nodes (i..i+1, j..j+1, k..k+1). Beyond a physical
@@ -85,8 +87,9 @@ inline Kokkos::MinLoc<double, int>::value_type smallest_volume(const GridViews& 
       "corpuscle::grid::smallest_volume", Policy(0, index.owned()),
       KOKKOS_LAMBDA(int e, Reducer::value_type & least) {
         const int i = e % index.n[0], j = (e / index.n[0]) % index.n[1], k = e / (index.n[0] * index.n[1]);
-        const double v = volume(index.cell(i, j, k));
-        if (!(v >= least.val)) least.val = v, least.loc = e;
+        const double volume_here = volume(index.cell(i, j, k));
+        const double v = std::isfinite(volume_here) ? volume_here : -DBL_MAX;  // a node is not a number: worst of all
+        if (v < least.val) least.val = v, least.loc = e;
       },
       Reducer(smallest));
   return smallest;

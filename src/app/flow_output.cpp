@@ -1,6 +1,7 @@
 #include "app/flow_output.hpp"
 
 #include "app/reference_flows.hpp"
+#include "core/units.hpp"
 #include "coupling/restart.hpp"
 #include "membrane/shape_measures.hpp"
 #include "output/owned_values.hpp"
@@ -229,6 +230,9 @@ void FlowOutput::fill(Report& report) {
   report.momentum_iterations = momentum_;
   report.pressure_iterations = pressure_;
   report.coupling_iterations = coupling_;
+  Triple mean = simulation_.fluid().mean_velocity();
+  for (double& component : mean) component /= units::mm_per_s;
+  report.extra["superficial_velocity_mm_per_s"] = mean;
   report.extra["pressure_setups"] = simulation_.fluid().pressure_setups();
   report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],
                            simulation_.grid().index().global[2]};

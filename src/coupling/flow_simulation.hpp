@@ -13,7 +13,7 @@ namespace corpuscle {
 struct StabilityEstimate {
   double mass_term = 0;   // M / (A dt), pg/um2/us
   double beta = 0;        // Robin coefficient in use, pg/um2/us
-  double threshold = 0;   // half the largest reaction of the fluid, mu / h
+  double threshold = 0;   // half the largest reaction of the fluid, 2 mu / h
   double margin() const { return (mass_term + beta) / threshold; }
 };
 

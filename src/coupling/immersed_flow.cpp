@@ -1,10 +1,12 @@
 #include "coupling/immersed_flow.hpp"
 
 #include "core/error.hpp"
+#include "grid/metrics.hpp"
 #include "immersed/surface_motion.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace corpuscle {
@@ -124,6 +126,22 @@ std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>
   for (int b = 0; b < surfaces_.bodies; ++b)
     for (int m = 0; m < 3; ++m) result[b][0][m] = host(b, m), result[b][1][m] = host(b, 3 + m);
   return result;
+}
+
+double ImmersedFlow::smallest_spacing_at_surfaces() {
+  const IndexSpace& index = fluid_.grid().index();
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), fluid_.grid().views().x);
+  const auto xi = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), boundary_->places().xi);
+  const auto owned = boundary_->owned_vertices();
+  double smallest = 1e300;
+  for (std::size_t v = 0; v < owned.size(); ++v) {
+    if (!owned[v]) continue;
+    int at[3];
+    for (int d = 0; d < 3; ++d) at[d] = std::clamp(static_cast<int>(std::lround(xi(v, d))), 0, index.n[d] - 1);
+    const int c = index.cell(at[0], at[1], at[2]);
+    for (int d = 0; d < 3; ++d) smallest = std::min(smallest, norm(central_offset(x, c, index.stride(d))));
+  }
+  return fluid_.grid().comm().min(smallest);
 }
 
 std::array<double, 2> ImmersedFlow::slip() {

@@ -42,6 +42,9 @@ class ImmersedFlow {
   /// Largest and rms difference between the fluid's velocity carried to the surface and the surface's own, um/us.
   std::array<double, 2> slip();
 
+  /// Smallest grid spacing, over directions and the surfaces' present vertices, um. Copies to the host: for set-up.
+  double smallest_spacing_at_surfaces();
+
   const ImmersedReport& report() const { return report_; }
   FluidSolver& fluid() { return fluid_; }
   ImmersedBoundary& boundary() { return *boundary_; }

@@ -72,6 +72,12 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     }
     side.box.lower[side.d] = side.end == 0 ? -1 : index.n[side.d];
     side.box.upper[side.d] = side.box.lower[side.d] + 1;
+    side.inner = side.box;
+    for (int e = 0; e < 3; ++e) {
+      if (e == side.d) continue;
+      if (grid.halo().neighbour(e, 0) < 0) side.inner.lower[e] = 0;
+      if (grid.halo().neighbour(e, 1) < 0) side.inner.upper[e] = index.n[e];
+    }
     side.inward = side.end == 0 ? index.stride(side.d) : -index.stride(side.d);
     side.to_face = side.end == 0 ? index.stride(side.d) : 0;
     side.faces = {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
@@ -92,13 +98,7 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     if (side.settings.type == Type::velocity_inlet || side.settings.type == Type::moving_wall) set_profile(side, shape);
     if (side.settings.type == Type::outflow && side.here) {
       // Edges belong to the neighbouring sides: only faces of the outflow itself carry a pressure.
-      CellBox faces = side.box;
-      for (int e = 0; e < 3; ++e) {
-        if (e == side.d) continue;
-        if (grid.halo().neighbour(e, 0) < 0) faces.lower[e] = 0;
-        if (grid.halo().neighbour(e, 1) < 0) faces.upper[e] = index.n[e];
-      }
-      mark_box(index, faces, outflow_);
+      mark_box(index, side.inner, outflow_);
     }
   }
   set_time(0);
@@ -190,7 +190,7 @@ void BoundaryConditions::fill_sides(const Components<double>& u, bool homogeneou
     switch (side.settings.type) {
       case Type::outflow: fill_outflow(index, side.box, side.inward, u); break;
       case Type::symmetry:
-        fill_symmetry(index, side.box, side.inward, side.to_face, grid_->views().face_area[side.d], u);
+        fill_symmetry(index, side.box, side.inner, side.inward, side.to_face, grid_->views().face_area[side.d], u);
         break;
       case Type::wall: fill_zero(index, side.box, u); break;
       default:

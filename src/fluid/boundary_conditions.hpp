@@ -39,6 +39,7 @@ class BoundaryConditions {
     int d = 0, end = 0;  // direction, and 0 for its low end or 1 for its high end
     bool here = false;   // this rank touches it
     CellBox box;         // boundary nodes, halo included
+    CellBox inner;       // the same without the edges of the block
     int inward = 0;      // padded offset from a boundary node to the cell beside it
     int to_face = 0;     // padded offset from a boundary node to the index of its face
     CellBox faces;       // owned faces of the side

@@ -92,13 +92,15 @@ class FluidSolver {
   void fill_matrix(const Array<NodeKind>& kind);
   void fill_halos(const Components<double>& u);
   void assemble_history(double time_us);
-  double momentum_residual(const EmbeddedBodies* bodies);
+  double momentum_residual();
   void solve_momentum(const EmbeddedBodies* bodies, double residual, int pass);
   void project(const EmbeddedBodies* bodies);
   void make_flux(const EmbeddedBodies* bodies);
   template <class Vector>
   void apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out);
-  void apply_to_field(const EmbeddedBodies* bodies, const Components<double>& u, const Array<double>& out);
+  void apply_to_field(const Components<double>& u, const Array<double>& out);
+  void exchange_immersed(const Components<double>& u);
+  void complete_velocity(const EmbeddedBodies* bodies);
 
   Grid* grid_;
   Timers own_timers_;

@@ -23,7 +23,8 @@ class PressureSolver {
   const Table<double>& values() const { return value_; }
   void set_values();
 
-  /// Solve for `x` from the x given until the residual's 2-norm is below `absolute_tolerance`.
+  /// Solve for `x` from zero until the residual's 2-norm is below `absolute_tolerance`, or ten digits below that of
+  /// `rhs`: then solve again for what is left. The `residual` returned is that of the start.
   KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
 
   /// Whether there is no preconditioner yet, or iterations have grown since the last set-up.

@@ -13,16 +13,20 @@ namespace corpuscle {
 
 namespace {
 
-/// Sum over owned cells of volume times the larger (g_e / g_d)^2 at the lower face of direction d.
-double sum_cross_coefficients(const GridViews& grid, int d) {
+/// Sums over owned cells, with r the larger |g_e / g_d| at the lower face of direction d: of V r^2, and of V where
+/// r is above `limit`.
+struct CrossCoefficients {
+  double square = 0, above = 0;
+};
+CrossCoefficients sum_cross_coefficients(const GridViews& grid, int d, double limit) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   const auto area = grid.face_area[d];
   const auto volume = grid.volume;
-  double total = 0;
+  CrossCoefficients total;
   Kokkos::parallel_reduce(
       "corpuscle::grid::skewness", Policy(0, index.owned()),
-      KOKKOS_LAMBDA(int e, double& sum) {
+      KOKKOS_LAMBDA(int e, double& square, double& above) {
         const int i = e % index.n[0], j = (e / index.n[0]) % index.n[1], k = e / (index.n[0] * index.n[1]);
         const int c = index.cell(i, j, k);
         const Vec3 g = face_coefficients(x, load(area, c), index, d, c);
@@ -31,9 +35,10 @@ double sum_cross_coefficients(const GridViews& grid, int d) {
           const double ratio = m != d ? g[m] / g[d] : 0;
           if (ratio * ratio > most) most = ratio * ratio;
         }
-        sum += volume(c) * most;
+        square += volume(c) * most;
+        if (most > limit * limit) above += volume(c);
       },
-      total);
+      total.square, total.above);
   return total;
 }
 
@@ -67,6 +72,25 @@ double sum_volume(const GridViews& grid) {
   return total;
 }
 
+/// @throws InputError  unless every node of the far side of direction d is its partner on the near side moved by `period`
+void check_translates(const NodeSource& source, int d, const Triple& period) {
+  const int e = (d + 1) % 3, f = (d + 2) % 3;
+  const double tolerance = 1e-9 * (1 + std::abs(period[0]) + std::abs(period[1]) + std::abs(period[2]));
+  std::array<int, 3> near{}, far{};
+  far[d] = source.cells[d];
+  for (near[f] = 0; near[f] <= source.cells[f]; ++near[f])
+    for (near[e] = 0; near[e] <= source.cells[e]; ++near[e]) {
+      far[e] = near[e], far[f] = near[f];
+      const Triple a = source.node(near[0], near[1], near[2]), b = source.node(far[0], far[1], far[2]);
+      for (int m = 0; m < 3; ++m)
+        if (!(std::abs(b[m] - a[m] - period[m]) <= tolerance))
+          throw InputError(fmt::format(
+              "boundary: the {} sides cannot be periodic: they are not the same shape moved along one vector (node "
+              "({}, {}, {}) is out of place by {:.3g} um)",
+              std::array<const char*, 3>{"i", "j", "k"}[d], far[0], far[1], far[2], b[m] - a[m] - period[m]));
+    }
+}
+
 }  // namespace
 
 Grid::Grid(const Comm& comm, const NodeSource& source, const std::array<bool, 3>& periodic)
@@ -91,15 +115,7 @@ void Grid::fill_nodes(const NodeSource& source) {
     high[d] = source.cells[d];
     const Triple a = source.node(low[0], low[1], low[2]), b = source.node(high[0], high[1], high[2]);
     for (int m = 0; m < 3; ++m) period_[d][m] = b[m] - a[m];
-    std::array<int, 3> far = source.cells;
-    far[d] = 0;
-    const Triple c = source.node(far[0], far[1], far[2]);
-    const Triple e = source.node(source.cells[0], source.cells[1], source.cells[2]);
-    for (int m = 0; m < 3; ++m)
-      if (std::abs(e[m] - c[m] - period_[d][m]) > 1e-9 * (1 + std::abs(period_[d][m])))
-        throw InputError(fmt::format(
-            "boundary: the {} sides cannot be periodic: they are not the same shape moved along one vector",
-            std::array<const char*, 3>{"i", "j", "k"}[d]));
+    check_translates(source, d, period_[d]);
   }
   const NodeIndex at{index};
   Components<double> node(uninitialised("corpuscle::grid::node"), at.size(), 3);
@@ -132,23 +148,26 @@ void Grid::fill_nodes(const NodeSource& source) {
 
 void Grid::check_volumes() {
   const auto smallest = smallest_volume(views_);
-  if (comm_.min(smallest.val) > 0) return;
-  std::string message;
-  if (!(smallest.val > 0)) {
+  const bool bad = !(smallest.val > 0);
+  const double first = comm_.min(static_cast<double>(bad ? comm_.rank() : comm_.size()));
+  if (first == comm_.size()) return;
+  double found[7] = {0, 0, 0, 0, 0, 0, 0};  // cell, centre and volume, from the first rank that has one
+  if (first == comm_.rank()) {
     const IndexSpace& index = views_.index;
-    const int i = smallest.loc % index.n[0], j = (smallest.loc / index.n[0]) % index.n[1],
-              k = smallest.loc / (index.n[0] * index.n[1]);
-    auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.x);
-    const int c = index.cell(i, j, k);
-    message = fmt::format(
-        "grid: cell ({}, {}, {}) at ({:.4g}, {:.4g}, {:.4g}) um has the volume {:.3g} um3; every cell needs a positive "
-        "one. The grid is folded or left-handed there: check the node coordinates and their order (i, j, k must form a "
-        "right-handed system)",
-        i + index.first[0], j + index.first[1], k + index.first[2], x(c, 0), x(c, 1), x(c, 2), smallest.val);
-  } else {
-    message = "grid: a cell of another rank has a non-positive volume";
+    const int at[3] = {smallest.loc % index.n[0], (smallest.loc / index.n[0]) % index.n[1],
+                       smallest.loc / (index.n[0] * index.n[1])};
+    const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.x);
+    const auto volume = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.volume);
+    const int c = index.cell(at[0], at[1], at[2]);
+    for (int d = 0; d < 3; ++d) found[d] = at[d] + index.first[d], found[3 + d] = x(c, d);
+    found[6] = volume(c);
   }
-  throw InputError(message);
+  comm_.sum(found, 7);
+  throw InputError(fmt::format(
+      "grid: cell ({}, {}, {}) at ({:.4g}, {:.4g}, {:.4g}) um has the volume {:.3g} um3; every cell needs a positive "
+      "one. The grid is folded or left-handed there: check the node coordinates and their order (i, j, k must form a "
+      "right-handed system)",
+      found[0], found[1], found[2], found[3], found[4], found[5], found[6]));
 }
 
 void Grid::measure() {
@@ -157,7 +176,11 @@ void Grid::measure() {
   mean_spacing_ = std::cbrt(total_volume_ / (static_cast<double>(index.global[0]) * index.global[1] * index.global[2]));
   smallest_spacing_ = std::numeric_limits<double>::max();
   for (int d = 0; d < 3; ++d) {
-    skewness_ = std::max(skewness_, std::sqrt(comm_.sum(sum_cross_coefficients(views_, d)) / total_volume_));
+    const auto mine = sum_cross_coefficients(views_, d, negligible_typical_skewness);
+    double sums[2] = {mine.square, mine.above};
+    comm_.sum(sums, 2);
+    skewness_ = std::max(skewness_, std::sqrt(sums[0] / total_volume_));
+    skewed_share_ = std::max(skewed_share_, sums[1] / total_volume_);
     smallest_spacing_ = std::min(smallest_spacing_, comm_.min(smallest_offset(views_, d)));
   }
 }

@@ -1,0 +1,237 @@
+#include "fluid_fixture.hpp"
+
+#include "fluid/flux.hpp"
+#include "fluid/pressure_solver.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace corpuscle;
+using namespace corpuscle::fluid_test;
+
+namespace {
+
+/// A grid with everything the pressure rows are made from. Some cells are marked as bodies, one side as an outflow.
+struct Scene {
+  Grid grid;
+  ViscousCoefficients g;
+  Array<NodeKind> kind;
+  PressureMask outflow, mask;
+  bool skewed;
+
+  Scene(const NodeSource& source, bool with_bodies, bool with_outflow)
+      : grid(Comm(), source, {false, false, false}), skewed(!grid.orthogonal()) {
+    const IndexSpace index = grid.index();
+    const int n = index.size();
+    for (int d = 0; d < 3; ++d) {
+      g.normal[d] = Array<double>("corpuscle::test::normal", n);
+      for (int e = 0; e < 3; ++e) g.cross[d][e] = Array<double>("corpuscle::test::cross", n);
+    }
+    if (skewed)
+      viscous_coefficients<true>(grid.views(), g);
+    else
+      viscous_coefficients<false>(grid.views(), g);
+    kind = Array<NodeKind>("corpuscle::test::kind", n);
+    Kokkos::deep_copy(kind, grid.views().base_kind);
+    outflow = PressureMask("corpuscle::test::outflow", n);
+    mask = PressureMask("corpuscle::test::mask", n);
+    if (with_bodies) {
+      const auto k_view = kind;
+      for_owned("corpuscle::test::bodies", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        if ((3 * i + 5 * j + 7 * k) % 11 == 0) k_view(index.cell(i, j, k)) = NodeKind::immersed;
+      });
+    }
+    if (with_outflow) mark_box(index, {{0, 0, index.n[2]}, {index.n[0], index.n[1], index.n[2] + 1}}, outflow);
+    mark_pressure(kind, outflow, mask);
+  }
+
+  Table<double> rows(int pinned = -1) const {
+    const RowPattern pattern = RowPattern::make(skewed);
+    Table<double> value("corpuscle::test::value", grid.index().owned(), pattern.count);
+    if (skewed)
+      pressure_rows<true>(grid.views(), g.normal, kind, mask, pattern, pinned, value);
+    else
+      pressure_rows<false>(grid.views(), g.normal, kind, mask, pattern, pinned, value);
+    return value;
+  }
+};
+
+NodeSource straight_box() { return make_node_source(box({6, 5, 7}, {3, 2.5, 4})); }
+
+/// Largest difference between A psi, from the rows, and minus the divergence of psi's flux, from correct_flux.
+double row_error(const Scene& s) {
+  const IndexSpace index = s.grid.index();
+  const auto psi = Array<double>("corpuscle::test::psi", index.size());
+  const auto mask = s.mask;
+  const auto kind = s.kind;
+  Kokkos::parallel_for("corpuscle::test::psi", Policy(0, index.size()), KOKKOS_LAMBDA(int c) {
+    psi(c) = kind(c) == NodeKind::fluid ? std::sin(0.37 * c) + 0.2 * std::cos(0.011 * c) : 0.0;
+  });
+  Array<double> flux[3];
+  for (auto& f : flux) f = Array<double>("corpuscle::test::flux", index.size());
+  const Array<double> divergence("corpuscle::test::divergence", index.owned());
+  if (s.skewed)
+    correct_flux<true>(s.grid.views(), s.g.normal, mask, psi, flux);
+  else
+    correct_flux<false>(s.grid.views(), s.g.normal, mask, psi, flux);
+  negative_divergence(s.grid.views(), kind, flux, divergence);
+  const auto rows = s.rows();
+  const RowPattern pattern = RowPattern::make(s.skewed);
+  double worst = 0;
+  reduce_owned("corpuscle::test::row_error", index,
+               KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+                 const int r = index.compact(i, j, k);
+                 if (kind(index.cell(i, j, k)) != NodeKind::fluid) return;
+                 double sum = divergence(r);
+                 for (int n = 0; n < pattern.count; ++n)
+                   sum += rows(r, n) * psi(index.cell(i + pattern.di[n], j + pattern.dj[n], k + pattern.dk[n]));
+                 most = std::abs(sum) > most ? std::abs(sum) : most;
+               },
+               Kokkos::Max<double>(worst));
+  return worst;
+}
+
+/// Largest error of the nodal and of the face gradient for a pressure that is linear in space.
+double linear_error(const Scene& s) {
+  const IndexSpace index = s.grid.index();
+  const auto x = s.grid.views().x;
+  const auto mask = s.mask;
+  const auto kind = s.kind;
+  const Vec3 slope{0.7, -1.1, 0.4};
+  const auto p = Array<double>("corpuscle::test::p", index.size());
+  Kokkos::parallel_for("corpuscle::test::p", Policy(0, index.size()), KOKKOS_LAMBDA(int c) {
+    // A value that would spoil any formula that read it where there is no pressure.
+    p(c) = mask(c) ? dot(slope, load(x, c)) : 1e6;
+  });
+  double worst = 0;
+  for (int d = 0; d < 3; ++d) {
+    const auto area = s.grid.views().face_area[d];
+    const auto coefficient = s.g.normal[d];
+    const bool skewed = s.skewed;
+    double here = 0;
+    reduce_owned("corpuscle::test::linear_error", index,
+                 KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+                   const int c = index.cell(i, j, k);
+                   if (kind(c) != NodeKind::fluid) return;
+                   // Where no neighbour along a direction has a pressure the gradient along it is taken as zero.
+                   for (int e = 0; e < 3; ++e)
+                     if (!mask(c - index.stride(e)) && !mask(c + index.stride(e))) return;
+                   double error = norm(cell_gradient(p, mask, x, index, c) - slope);
+                   const int low = c - index.stride(d);
+                   bool face = mask(low);
+                   for (int e = 0; e < 3; ++e)
+                     face = face && (e == d || mask(low - index.stride(e)) || mask(low + index.stride(e)));
+                   if (face) {
+                     const Vec3 a = load(area, c);
+                     const double flux = skewed ? face_gradient<true>(p, mask, x, a, coefficient(c), index, d, c)
+                                                : face_gradient<false>(p, mask, x, a, coefficient(c), index, d, c);
+                     const double off = std::abs(flux - dot(slope, a)) / norm(a);
+                     error = off > error ? off : error;
+                   }
+                   most = error > most ? error : most;
+                 },
+                 Kokkos::Max<double>(here));
+    worst = std::max(worst, here);
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("pressure rows are minus the divergence of the flux correction", "[fluid]") {
+  const bool bodies = GENERATE(false, true), outflow = GENERATE(false, true);
+  CHECK(row_error(Scene(straight_box(), bodies, outflow)) < 1e-13);         // coefficients of order one: round-off
+  CHECK(row_error(Scene(warped_box({6, 5, 7}), bodies, outflow)) < 1e-13);
+}
+
+TEST_CASE("pressure rows sum to zero away from an outflow and are symmetric on an orthogonal grid", "[fluid]") {
+  for (const bool skewed : {false, true}) {
+    const Scene s(skewed ? warped_box({6, 5, 7}) : straight_box(), true, true);
+    REQUIRE(s.skewed == skewed);
+    const IndexSpace index = s.grid.index();
+    const auto value = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), s.rows());
+    const auto kind = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), s.kind);
+    const RowPattern pattern = RowPattern::make(skewed);
+    visit_owned(index, [&](int i, int j, int k, int c) {
+      if (kind(c) != NodeKind::fluid) return;
+      const int r = index.compact(i, j, k);
+      double sum = 0;
+      for (int n = 0; n < pattern.count; ++n) sum += value(r, n);
+      if (k + 2 < index.n[2]) CHECK(std::abs(sum) < 1e-14);  // round-off
+      CHECK(value(r, 0) > 0);
+      for (int n = 1; n < pattern.count && !skewed; ++n) {
+        const int to[3] = {i + pattern.di[n], j + pattern.dj[n], k + pattern.dk[n]};
+        if (!index.owns(to[0], to[1], to[2]) || kind(index.cell(to[0], to[1], to[2])) != NodeKind::fluid) continue;
+        for (int m = 1; m < pattern.count; ++m)
+          if (pattern.di[m] == -pattern.di[n] && pattern.dj[m] == -pattern.dj[n] && pattern.dk[m] == -pattern.dk[n])
+            CHECK(value(r, n) == value(index.compact(to[0], to[1], to[2]), m));
+      }
+    });
+  }
+}
+
+TEST_CASE("pressure gradients are exact for linear pressures, beside walls, bodies and outflows too", "[fluid]") {
+  const bool bodies = GENERATE(false, true), outflow = GENERATE(false, true);
+  CHECK(linear_error(Scene(straight_box(), bodies, outflow)) < 1e-12);      // differences over spacings of 0.3
+  CHECK(linear_error(Scene(warped_box({6, 5, 7}), bodies, outflow)) < 1e-12);
+}
+
+TEST_CASE("the pressure solver reaches the tolerance it is given", "[fluid][ranks]") {
+  const Comm comm;
+  const bool skewed = GENERATE(false, true);
+  const std::array<bool, 3> periodic{false, false, true};
+  const NodeSource sheared{{8, 9, 12}, [](int i, int j, int k) { return Triple{i + 0.4 * j, 1.0 * j, 1.2 * k}; }};
+  Grid grid(comm, skewed ? sheared : make_node_source(box({8, 9, 12}, {4, 4, 6})), periodic);
+  REQUIRE(grid.orthogonal() == !skewed);
+  auto conditions = sides({Type::wall, Type::wall, Type::wall, Type::wall, Type::periodic, Type::periodic});
+  PressureSolver solver(grid, skewed, 200);
+  const IndexSpace index = grid.index();
+  ViscousCoefficients g;
+  for (int d = 0; d < 3; ++d) {
+    g.normal[d] = Array<double>("corpuscle::test::normal", index.size());
+    for (int e = 0; e < 3; ++e) g.cross[d][e] = Array<double>("corpuscle::test::cross", index.size());
+  }
+  PressureMask none("corpuscle::test::outflow", index.size()), mask("corpuscle::test::mask", index.size());
+  mark_pressure(grid.views().base_kind, none, mask);
+  // No outflow: the level is free, and one node fixes it.
+  const int pinned = comm.root() ? index.cell(0, 0, 0) : -1;
+  if (skewed) {
+    viscous_coefficients<true>(grid.views(), g);
+    pressure_rows<true>(grid.views(), g.normal, grid.views().base_kind, mask, solver.pattern(), pinned, solver.values());
+  } else {
+    viscous_coefficients<false>(grid.views(), g);
+    pressure_rows<false>(grid.views(), g.normal, grid.views().base_kind, mask, solver.pattern(), pinned,
+                         solver.values());
+  }
+  solver.set_values();
+  solver.set_up();
+  // A right-hand side that sums to zero: the divergence of an arbitrary flux through inner faces.
+  const Array<double> psi("corpuscle::test::psi", index.size());
+  Kokkos::parallel_for("corpuscle::test::psi", Policy(0, index.size()), KOKKOS_LAMBDA(int c) {
+    int i, j, k;
+    index.unpack(c, i, j, k);
+    psi(c) = std::sin(0.9 * (i + index.first[0])) * std::cos(1.1 * (j + index.first[1])) +
+             std::cos(0.5235987755982988 * 2 * (k + index.first[2]));
+  });
+  Array<double> flux[3];
+  for (auto& f : flux) f = Array<double>("corpuscle::test::flux", index.size());
+  const Array<double> rhs("corpuscle::test::rhs", index.owned()), x("corpuscle::test::x", index.owned());
+  const Array<double> left("corpuscle::test::left", index.owned()), field("corpuscle::test::field", index.size());
+  const auto correct = [&](const Array<double>& p) {
+    if (skewed)
+      correct_flux<true>(grid.views(), g.normal, mask, p, flux);
+    else
+      correct_flux<false>(grid.views(), g.normal, mask, p, flux);
+  };
+  correct(psi);
+  negative_divergence(grid.views(), grid.views().base_kind, flux, rhs);
+  const double start = comm.max(largest_magnitude(rhs));
+  REQUIRE(start > 0.1);
+  const auto result = solver.solve(rhs, x, 1e-11);
+  CHECK(result.converged);
+  CHECK(result.iterations < 40);
+  scalar_from_compact(index, x, field);
+  grid.halo().exchange(field);
+  correct(field);
+  negative_divergence(grid.views(), grid.views().base_kind, flux, left);
+  CHECK(comm.max(largest_magnitude(left)) < 1.1e-11);  // the tolerance, and the round-off of the residual
+}
