@@ -4,6 +4,7 @@
 #include <Kokkos_Core.hpp>
 
 #include <cstdint>
+#include <utility>
 
 namespace corpuscle {
 
@@ -21,6 +22,10 @@ using Components = Kokkos::View<T**, Kokkos::LayoutLeft, Memory>;
 /// Row-wise table: [entry, column], the columns of one entry contiguous.
 template <class T>
 using Table = Kokkos::View<T**, Kokkos::LayoutRight, Memory>;
+
+/// What Kokkos::create_mirror_view returns; the name of the view's own member type depends on the version of Kokkos.
+template <class View>
+using HostMirror = decltype(Kokkos::create_mirror_view(std::declval<const View&>()));
 
 using Policy = Kokkos::RangePolicy<Exec>;
 

@@ -3,6 +3,7 @@
 
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid_views.hpp"
+#include "grid/halo_copy.hpp"
 
 namespace corpuscle {
 

@@ -60,7 +60,7 @@ class ImmersedFlow {
   std::unique_ptr<ImmersedBoundary> boundary_;
   EmbeddedBodies bodies_;
   Components<double> traction_;
-  Components<double>::HostMirror traction_host_;
+  HostMirror<Components<double>> traction_host_;
   ImmersedReport report_;
 };
 

@@ -90,9 +90,9 @@ struct HostSet {
   }
 
   int vertices = 0, triangles = 0, entries = 0;
-  Components<double>::HostMirror x;
-  Table<int>::HostMirror triangle, neighbour;
-  Array<int>::HostMirror vertex_body, triangle_body, first_vertex, first_triangle, ring_start, ring_triangle,
+  HostMirror<Components<double>> x;
+  HostMirror<Table<int>> triangle, neighbour;
+  HostMirror<Array<int>> vertex_body, triangle_body, first_vertex, first_triangle, ring_start, ring_triangle,
       ring_corner;
 };
 

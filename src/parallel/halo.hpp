@@ -34,7 +34,7 @@ class Halo {
   IndexSpace index_;
   int neighbour_[3][2];
   Array<double> send_[2], receive_[2];
-  Array<double>::HostMirror send_host_[2], receive_host_[2];
+  HostMirror<Array<double>> send_host_[2], receive_host_[2];
 };
 
 }  // namespace corpuscle

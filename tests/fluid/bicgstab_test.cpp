@@ -9,15 +9,17 @@ namespace {
 /// y = A x for one-dimensional diffusion and transport: 2 + shift on the diagonal, -1 - skew and -1 + skew beside it.
 void apply_transport(double shift, double skew, const Array<double>& x, const Array<double>& y) {
   const int n = static_cast<int>(x.extent(0));
-  Kokkos::parallel_for("corpuscle::test::transport", Policy(0, n), KOKKOS_LAMBDA(int i) {
-    const double low = i > 0 ? x(i - 1) : 0.0, high = i + 1 < n ? x(i + 1) : 0.0;
-    y(i) = (2 + shift) * x(i) - (1 + skew) * low - (1 - skew) * high;
-  });
+  Kokkos::parallel_for(
+      "corpuscle::test::transport", Policy(0, n), KOKKOS_LAMBDA(int i) {
+        const double low = i > 0 ? x(i - 1) : 0.0, high = i + 1 < n ? x(i + 1) : 0.0;
+        y(i) = (2 + shift) * x(i) - (1 + skew) * low - (1 - skew) * high;
+      });
 }
 
 void set_wave(const Array<double>& x) {
-  Kokkos::parallel_for("corpuscle::test::wave", Policy(0, static_cast<int>(x.extent(0))),
-                       KOKKOS_LAMBDA(int i) { x(i) = std::sin(0.3 * i) + 0.1 * i; });
+  Kokkos::parallel_for(
+      "corpuscle::test::wave", Policy(0, static_cast<int>(x.extent(0))),
+      KOKKOS_LAMBDA(int i) { x(i) = std::sin(0.3 * i) + 0.1 * i; });
 }
 
 double distance(const Array<double>& a, const Array<double>& b) {
@@ -44,8 +46,9 @@ TEST_CASE("BiCGStab solves a known system that is not symmetric", "[fluid]") {
   set_wave(exact);
   apply_transport(0.05, skew, exact, rhs);
   const double tolerance = 1e-9;
-  const auto result = solver.solve([&](const Array<double>& in, const Array<double>& out) { apply_transport(0.05, skew, in, out); },
-                                   rhs, x, tolerance, 500);
+  const auto result =
+      solver.solve([&](const Array<double>& in, const Array<double>& out) { apply_transport(0.05, skew, in, out); },
+                   rhs, x, tolerance, 500);
   REQUIRE(result.converged);
   CHECK(result.iterations > 5);
   CHECK(result.residual <= tolerance);
@@ -79,8 +82,8 @@ TEST_CASE("BiCGStab reports a breakdown instead of an answer", "[fluid]") {
   Kokkos::deep_copy(rhs, 1.0);
   const auto result = solver.solve(
       [](const Array<double>& in, const Array<double>& out) {
-        Kokkos::parallel_for("corpuscle::test::rotate", Policy(0, 2),
-                             KOKKOS_LAMBDA(int i) { out(i) = i == 0 ? -in(1) : in(0); });
+        Kokkos::parallel_for(
+            "corpuscle::test::rotate", Policy(0, 2), KOKKOS_LAMBDA(int i) { out(i) = i == 0 ? -in(1) : in(0); });
       },
       rhs, x, 1e-10, 50);
   CHECK_FALSE(result.converged);

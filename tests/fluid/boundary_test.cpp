@@ -1,6 +1,6 @@
-#include "fluid_fixture.hpp"
-
 #include <catch2/catch.hpp>
+
+#include "fluid_fixture.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::fluid_test;
@@ -29,7 +29,8 @@ struct Filled {
   BoundaryConditions conditions;
   Components<double> u;
   Filled(const GridSettings& shape, const std::vector<BoundarySettings>& sides, const std::array<bool, 3>& periodic)
-      : grid(Comm(), make_node_source(shape), periodic), conditions(grid, sides, &shape),
+      : grid(Comm(), make_node_source(shape), periodic),
+        conditions(grid, sides, &shape),
         u("corpuscle::test::u", grid.index().size(), 3) {}
   void fill(double t) {
     conditions.set_time(t);
@@ -125,14 +126,17 @@ TEST_CASE("ramps and tables in time multiply the profile", "[fluid]") {
 }
 
 TEST_CASE("each kind of side fills the boundary as it should", "[fluid]") {
-  auto all = sides({Type::symmetry, Type::wall, Type::moving_wall, Type::symmetry, Type::velocity_inlet, Type::outflow});
+  auto all =
+      sides({Type::symmetry, Type::wall, Type::moving_wall, Type::symmetry, Type::velocity_inlet, Type::outflow});
   all[2].velocity = Triple{0.5, 0, -0.25};
   all[4].velocity = Triple{0.1, 0.2, 0.7};
   Filled scene(box({4, 5, 6}, {2, 2, 3}), all, open);
   const IndexSpace index = scene.grid.index();
   const auto u = scene.u;
-  Kokkos::parallel_for("corpuscle::test::u", Policy(0, index.size()),
-                       KOKKOS_LAMBDA(int c) { store(u, c, Vec3{1 + 0.01 * c, 2 - 0.02 * c, 3 + 0.03 * c}); });
+  Kokkos::parallel_for(
+      "corpuscle::test::u", Policy(0, index.size()), KOKKOS_LAMBDA(int c) {
+        store(u, c, Vec3{1 + 0.01 * c, 2 - 0.02 * c, 3 + 0.03 * c});
+      });
   scene.fill(0);
   const auto v = on_host(u);
   const auto is = [&](int c, const Triple& expected) {
@@ -181,10 +185,11 @@ TEST_CASE("prescribed sides without an outflow are balanced over their area", "[
   const auto u = scene.u;
   const auto f2 = flux[2];
   if (scene.grid.halo().neighbour(2, 0) < 0)
-    for_box("corpuscle::test::flux", {0, 0, 0}, {index.n[0], index.n[1], 1}, KOKKOS_LAMBDA(int i, int j, int k) {
-      const int c = index.cell(i, j, k);
-      f2(c) = dot(load(area, c), load(u, c - index.stride(2)));
-    });
+    for_box(
+        "corpuscle::test::flux", {0, 0, 0}, {index.n[0], index.n[1], 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+          const int c = index.cell(i, j, k);
+          f2(c) = dot(load(area, c), load(u, c - index.stride(2)));
+        });
   // 6 um3/us come in; the body inside shrinks by 1; the sides k_min (6 um2), j_min and j_max (8 um2 each) share the
   // missing 5: the fluxes out of the block end up at -1.
   CHECK(scene.conditions.balance(flux, -1) == Approx(5.0 / 22).epsilon(1e-13));

@@ -1,10 +1,10 @@
 // Scenes and helpers that the fluid tests share.
 #pragma once
 
+#include <cmath>
+
 #include "fluid/fluid_solver.hpp"
 #include "fluid/integrals.hpp"
-
-#include <cmath>
 
 namespace corpuscle::fluid_test {
 

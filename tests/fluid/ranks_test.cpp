@@ -1,7 +1,7 @@
 // The decomposition must not change the flow: every rank also runs the whole problem on its own.
-#include "fluid_fixture.hpp"
-
 #include <catch2/catch.hpp>
+
+#include "fluid_fixture.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::fluid_test;
@@ -17,8 +17,8 @@ struct Flow {
 
 struct Result {
   IndexSpace index;
-  Components<double>::HostMirror u;
-  Array<double>::HostMirror p;
+  HostMirror<Components<double>> u;
+  HostMirror<Array<double>> p;
   double divergence;
 };
 

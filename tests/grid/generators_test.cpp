@@ -1,8 +1,7 @@
-#include "grid_fixture.hpp"
+#include <catch2/catch.hpp>
 
 #include "core/error.hpp"
-
-#include <catch2/catch.hpp>
+#include "grid_fixture.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::grid_test;
@@ -56,8 +55,8 @@ TEST_CASE("the square's edge lands exactly on the circle", "[grid]") {
   const Map map = GENERATE(Map::conformal, Map::elliptical);
   for (int n = 0; n <= 40; ++n) {
     const double t = -1 + n / 20.0;
-    for (const auto& p : {square_to_disk(t, -1, map), square_to_disk(1, t, map), square_to_disk(t, 1, map),
-                          square_to_disk(-1, t, map)})
+    for (const auto& p :
+         {square_to_disk(t, -1, map), square_to_disk(1, t, map), square_to_disk(t, 1, map), square_to_disk(-1, t, map)})
       CHECK(std::hypot(p[0], p[1]) == Approx(1).epsilon(2e-14));  // round-off of the series behind the conformal map
   }
   const auto middle = square_to_disk(0, 0, map);
@@ -105,8 +104,8 @@ TEST_CASE("the tube's wall nodes lie on its circle and its volume converges", "[
 TEST_CASE("arc and helix have the length, axis and curvature of the exact curves", "[grid]") {
   const double pi = std::acos(-1.0);
   const Centerline curve(arc(20, 90));
-  CHECK(curve.length() == Approx(10 * pi).epsilon(1e-8));             // 20000 chords
-  CHECK(curve.largest_curvature() == Approx(0.05).epsilon(1e-4));     // differences over 1/4000 of the length
+  CHECK(curve.length() == Approx(10 * pi).epsilon(1e-8));          // 20000 chords
+  CHECK(curve.largest_curvature() == Approx(0.05).epsilon(1e-4));  // differences over 1/4000 of the length
   for (int m = 0; m <= 50; ++m) {
     const auto f = curve.at(curve.length() * m / 50);
     CHECK(std::hypot(f.position[0] - 20, f.position[2]) == Approx(20).epsilon(1e-7));  // straight between 4000 points
@@ -128,7 +127,8 @@ TEST_CASE("the spline passes through its points", "[grid]") {
   constexpr int samples = 40000;
   for (const auto& point : s.points_um) {
     double nearest = 1e9;
-    for (int m = 0; m <= samples; ++m) nearest = std::min(nearest, distance(curve.at(curve.length() * m / samples).position, point));
+    for (int m = 0; m <= samples; ++m)
+      nearest = std::min(nearest, distance(curve.at(curve.length() * m / samples).position, point));
     CHECK(nearest < curve.length() / samples);  // the spacing of the samples
   }
 }
@@ -141,7 +141,8 @@ TEST_CASE("frames are orthonormal, follow the tangent and do not twist", "[grid]
   for (double at = 0; at + step < curve.length(); at += step) {
     const auto f = curve.at(at), g = curve.at(at + step);
     REQUIRE(std::abs(dot(f.tangent, f.normal)) + std::abs(dot(f.tangent, f.binormal)) +
-                std::abs(dot(f.normal, f.binormal)) < 1e-12);
+                std::abs(dot(f.normal, f.binormal)) <
+            1e-12);
     REQUIRE(std::abs(dot(f.normal, f.normal) - 1) + std::abs(dot(f.binormal, f.binormal) - 1) < 1e-12);
     const Triple chord{g.position[0] - f.position[0], g.position[1] - f.position[1], g.position[2] - f.position[2]};
     REQUIRE(dot(chord, f.tangent) / std::sqrt(dot(chord, chord)) > 1 - 1e-4);  // turns by 0.1 / um x 0.02 um at most

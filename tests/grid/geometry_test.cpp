@@ -1,12 +1,10 @@
-#include "grid_fixture.hpp"
+#include <catch2/catch.hpp>
+#include <limits>
 
 #include "core/error.hpp"
 #include "fluid/integrals.hpp"
 #include "grid/metrics.hpp"
-
-#include <catch2/catch.hpp>
-
-#include <limits>
+#include "grid_fixture.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::grid_test;
@@ -19,14 +17,15 @@ double worst_closure(const GridViews& grid) {
   const IndexSpace index = grid.index;
   const auto s0 = grid.face_area[0], s1 = grid.face_area[1], s2 = grid.face_area[2];
   double worst = 0;
-  reduce_owned("corpuscle::test::closure", index,
-               KOKKOS_LAMBDA(int i, int j, int k, double& most) {
-                 const int c = index.cell(i, j, k);
-                 const Vec3 sum = load(s0, c + index.stride(0)) - load(s0, c) + load(s1, c + index.stride(1)) -
-                                  load(s1, c) + load(s2, c + index.stride(2)) - load(s2, c);
-                 most = norm(sum) > most ? norm(sum) : most;
-               },
-               Kokkos::Max<double>(worst));
+  reduce_owned(
+      "corpuscle::test::closure", index,
+      KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+        const int c = index.cell(i, j, k);
+        const Vec3 sum = load(s0, c + index.stride(0)) - load(s0, c) + load(s1, c + index.stride(1)) - load(s1, c) +
+                         load(s2, c + index.stride(2)) - load(s2, c);
+        most = norm(sum) > most ? norm(sum) : most;
+      },
+      Kokkos::Max<double>(worst));
   return worst;
 }
 
@@ -39,21 +38,22 @@ double worst_linear_flux(const GridViews& grid) {
   for (int d = 0; d < 3; ++d) {
     const auto area = grid.face_area[d];
     double here = 0;
-    reduce_owned("corpuscle::test::linear_flux", index,
-                 KOKKOS_LAMBDA(int i, int j, int k, double& most) {
-                   for (int side = 0; side < 2; ++side) {
-                     const int c = index.cell(i, j, k) + side * index.stride(d), low = c - index.stride(d);
-                     const Vec3 s = load(area, c), g = face_coefficients(x, s, index, d, c);
-                     double flux = g[d] * dot(slope, load(x, c) - load(x, low));
-                     for (int e = 0; e < 3; ++e)
-                       if (e != d)
-                         flux += g[e] * 0.5 * dot(slope, central_offset(x, c, index.stride(e)) +
-                                                             central_offset(x, low, index.stride(e)));
-                     const double error = std::abs(flux - dot(slope, s)) / norm(s);
-                     most = error > most ? error : most;
-                   }
-                 },
-                 Kokkos::Max<double>(here));
+    reduce_owned(
+        "corpuscle::test::linear_flux", index,
+        KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+          for (int side = 0; side < 2; ++side) {
+            const int c = index.cell(i, j, k) + side * index.stride(d), low = c - index.stride(d);
+            const Vec3 s = load(area, c), g = face_coefficients(x, s, index, d, c);
+            double flux = g[d] * dot(slope, load(x, c) - load(x, low));
+            for (int e = 0; e < 3; ++e)
+              if (e != d)
+                flux += g[e] * 0.5 *
+                        dot(slope, central_offset(x, c, index.stride(e)) + central_offset(x, low, index.stride(e)));
+            const double error = std::abs(flux - dot(slope, s)) / norm(s);
+            most = error > most ? error : most;
+          }
+        },
+        Kokkos::Max<double>(here));
     worst = std::max(worst, here);
   }
   return worst;
@@ -73,8 +73,8 @@ NodeSource with_bump(const NodeSource& source, int i0, int j0, int k0, const Tri
 TEST_CASE("area vectors close on every cell and volumes add up", "[grid]") {
   const Comm comm;
   const Grid grid(comm, crumpled_box({7, 6, 8}), {false, false, false});
-  CHECK(worst_closure(grid.views()) < 1e-16);                      // areas of 0.02: round-off
-  CHECK(grid.total_volume() == Approx(1).epsilon(1e-14));          // flat outer sides: the unit box, to round-off
+  CHECK(worst_closure(grid.views()) < 1e-16);              // areas of 0.02: round-off
+  CHECK(grid.total_volume() == Approx(1).epsilon(1e-14));  // flat outer sides: the unit box, to round-off
   CHECK(grid.mean_spacing() == Approx(std::cbrt(1.0 / (7 * 6 * 8))).epsilon(1e-14));
 }
 

@@ -1,9 +1,9 @@
 // Grids that the tests of this folder share.
 #pragma once
 
-#include "grid/grid.hpp"
-
 #include <cmath>
+
+#include "grid/grid.hpp"
 
 namespace corpuscle::grid_test {
 
@@ -17,7 +17,8 @@ inline GridSettings tube_settings(int across, int along, GridSettings::CrossSect
   return s;
 }
 
-/// Unit box whose inner nodes are moved by up to 0.2 spacings, by a fixed rule without any symmetry: faces are not flat.
+/// Unit box whose inner nodes are moved by up to 0.2 spacings, by a fixed rule without any symmetry: faces are not
+/// flat.
 inline NodeSource crumpled_box(const std::array<int, 3>& cells) {
   return {cells, [cells](int i, int j, int k) {
             const int at[3] = {i, j, k};

@@ -1,10 +1,8 @@
-#include "grid_fixture.hpp"
-
-#include "core/error.hpp"
-
+#include <algorithm>
 #include <catch2/catch.hpp>
 
-#include <algorithm>
+#include "core/error.hpp"
+#include "grid_fixture.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::grid_test;
@@ -64,9 +62,8 @@ int wrong_entries(const IndexSpace& index, Halo& halo, const Field& field, const
 }  // namespace
 
 TEST_CASE("halos hold the neighbour's cells, corners and periodic images included", "[grid][ranks]") {
-  const std::array<bool, 3> periodic =
-      GENERATE(std::array{false, false, false}, std::array{false, false, true}, std::array{true, false, true},
-               std::array{true, true, true});
+  const std::array<bool, 3> periodic = GENERATE(std::array{false, false, false}, std::array{false, false, true},
+                                                std::array{true, false, true}, std::array{true, true, true});
   const std::array<int, 3> cells = GENERATE(std::array{7, 6, 9}, std::array{3, 3, 13}, std::array{13, 3, 3});
   const Comm comm;
   std::array<int, 3> ranks;

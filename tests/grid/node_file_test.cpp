@@ -1,12 +1,13 @@
-#include "grid_fixture.hpp"
-
-#include "core/error.hpp"
 #include "grid/node_file.hpp"
 
-#include <catch2/catch.hpp>
+#include <unistd.h>
 
+#include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
+
+#include "core/error.hpp"
+#include "grid_fixture.hpp"
 
 #ifdef CORPUSCLE_HDF5
 #include <hdf5.h>
@@ -24,7 +25,8 @@ struct TemporaryFile {
   std::string path;
   explicit TemporaryFile(const std::string& name)
       : path((std::filesystem::temp_directory_path() /
-              ("corpuscle_nodes_" + std::to_string(static_cast<long>(::getpid())) + "_" + name)).string()) {}
+              ("corpuscle_nodes_" + std::to_string(static_cast<long>(::getpid())) + "_" + name))
+                 .string()) {}
   ~TemporaryFile() {
     std::error_code ignored;
     std::filesystem::remove(path, ignored);

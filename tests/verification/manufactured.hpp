@@ -1,11 +1,12 @@
 // A manufactured Navier-Stokes solution: an Arnold-Beltrami-Childress flow that varies in time, with a pressure of its
-// own, on a skewed curvilinear grid. curl u = u, so the Laplacian is -u and the convective term the gradient of |u|^2/2.
+// own, on a skewed curvilinear grid. curl u = u, so the Laplacian is -u and the convective term the gradient of
+// |u|^2/2.
 #pragma once
+
+#include <cmath>
 
 #include "fluid/fluid_solver.hpp"
 #include "fluid/integrals.hpp"
-
-#include <cmath>
 
 namespace corpuscle::manufactured {
 
@@ -50,14 +51,16 @@ struct Flow {
 
 inline void set_force(const GridViews& grid, const Flow& flow, double t, const Components<double>& force) {
   const auto x = grid.x;
-  Kokkos::parallel_for("corpuscle::test::force", Policy(0, grid.index.size()),
-                       KOKKOS_LAMBDA(int e) { store(force, e, flow.force(load(x, e), t)); });
+  Kokkos::parallel_for(
+      "corpuscle::test::force", Policy(0, grid.index.size()),
+      KOKKOS_LAMBDA(int e) { store(force, e, flow.force(load(x, e), t)); });
 }
 
 inline void set_velocity(const GridViews& grid, const Flow& flow, double t, const Components<double>& u) {
   const auto x = grid.x;
-  Kokkos::parallel_for("corpuscle::test::velocity", Policy(0, grid.index.size()),
-                       KOKKOS_LAMBDA(int e) { store(u, e, flow.velocity(load(x, e), t)); });
+  Kokkos::parallel_for(
+      "corpuscle::test::velocity", Policy(0, grid.index.size()),
+      KOKKOS_LAMBDA(int e) { store(u, e, flow.velocity(load(x, e), t)); });
 }
 
 /// Exact fluxes by the mid-point rule, at the mean of the neighbouring centres.
@@ -68,12 +71,13 @@ inline void set_face_flux(const GridViews& grid, const Flow& flow, double t, con
     const auto area = grid.face_area[d];
     const auto f = flux[d];
     const int stride = index.stride(d);
-    for_box("corpuscle::test::flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
-            KOKKOS_LAMBDA(int i, int j, int k) {
-              const int c = index.cell(i, j, k);
-              const Vec3 u = 0.5 * (flow.velocity(load(x, c), t) + flow.velocity(load(x, c - stride), t));
-              f(c) = dot(load(area, c), u);
-            });
+    for_box(
+        "corpuscle::test::flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
+        KOKKOS_LAMBDA(int i, int j, int k) {
+          const int c = index.cell(i, j, k);
+          const Vec3 u = 0.5 * (flow.velocity(load(x, c), t) + flow.velocity(load(x, c - stride), t));
+          f(c) = dot(load(area, c), u);
+        });
   }
 }
 
@@ -104,15 +108,16 @@ inline Errors difference(const Comm& comm, const NodeSource& source, const Field
   const auto views = grid.views();
   double sums[4] = {0, 0, 0, 0};
   for (int m = 0; m < 4; ++m) {
-    reduce_owned("corpuscle::test::difference", views.index,
-                 KOKKOS_LAMBDA(int i, int j, int k, double& sum) {
-                   const int c = views.index.cell(i, j, k);
-                   const Vec3 e = load(a.u, c) - load(b.u, c);
-                   const double ep = a.p(c) - b.p(c);
-                   const double term[4] = {dot(e, e), ep, ep * ep, 1};
-                   sum += views.volume(c) * term[m];
-                 },
-                 Kokkos::Sum<double>(sums[m]));
+    reduce_owned(
+        "corpuscle::test::difference", views.index,
+        KOKKOS_LAMBDA(int i, int j, int k, double& sum) {
+          const int c = views.index.cell(i, j, k);
+          const Vec3 e = load(a.u, c) - load(b.u, c);
+          const double ep = a.p(c) - b.p(c);
+          const double term[4] = {dot(e, e), ep, ep * ep, 1};
+          sum += views.volume(c) * term[m];
+        },
+        Kokkos::Sum<double>(sums[m]));
   }
   comm.sum(sums, 4);
   const double mean = sums[1] / sums[3];
@@ -121,7 +126,7 @@ inline Errors difference(const Comm& comm, const NodeSource& source, const Field
 
 /// All sides prescribe the exact velocity. Returns volume-weighted rms errors at the end; pressure up to its mean.
 inline Errors run(const Comm& comm, const NodeSource& source, double dt, int steps, FluidSettings settings,
-                  Fields* final = nullptr, Flow flow = {}) {
+                  Fields* fields = nullptr, Flow flow = {}) {
   Grid grid(comm, source, {false, false, false});
   flow.convective = settings.convection != FluidSettings::Convection::none;
   settings.density_pg_per_um3 = flow.rho;
@@ -143,8 +148,9 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
   auto start = solver.state();
   set_velocity(views, flow, -dt, start.u_old);
   set_velocity(views, flow, 0, start.u);
-  Kokkos::parallel_for("corpuscle::test::pressure", Policy(0, views.index.size()),
-                       KOKKOS_LAMBDA(int e) { start.p(e) = flow.pressure(load(views.x, e), 0); });
+  Kokkos::parallel_for(
+      "corpuscle::test::pressure", Policy(0, views.index.size()),
+      KOKKOS_LAMBDA(int e) { start.p(e) = flow.pressure(load(views.x, e), 0); });
   set_face_flux(views, flow, 0, start.flux);
   if (start.flux_old[0].data()) set_face_flux(views, flow, -dt, start.flux_old);
   start.history_levels = 1;
@@ -162,21 +168,22 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
   const auto u = solver.velocity();
   const auto p = solver.pressure();
   for (int m = 0; m < 4; ++m) {
-    reduce_owned("corpuscle::test::error", views.index,
-                 KOKKOS_LAMBDA(int i, int j, int k, double& sum) {
-                   const int c = views.index.cell(i, j, k);
-                   const Vec3 e = load(u, c) - flow.velocity(load(views.x, c), t);
-                   const double ep = p(c) - flow.pressure(load(views.x, c), t);
-                   const double term[4] = {dot(e, e), ep, ep * ep, 1};
-                   sum += views.volume(c) * term[m];
-                 },
-                 Kokkos::Sum<double>(sums[m]));
+    reduce_owned(
+        "corpuscle::test::error", views.index,
+        KOKKOS_LAMBDA(int i, int j, int k, double& sum) {
+          const int c = views.index.cell(i, j, k);
+          const Vec3 e = load(u, c) - flow.velocity(load(views.x, c), t);
+          const double ep = p(c) - flow.pressure(load(views.x, c), t);
+          const double term[4] = {dot(e, e), ep, ep * ep, 1};
+          sum += views.volume(c) * term[m];
+        },
+        Kokkos::Sum<double>(sums[m]));
   }
   comm.sum(sums, 4);
   errors.velocity = std::sqrt(sums[0] / sums[3]);
   const double mean = sums[1] / sums[3];
   errors.pressure = std::sqrt(std::max(sums[2] / sums[3] - mean * mean, 0.0));
-  if (final) *final = {u, p};
+  if (fields) *fields = {u, p};
   return errors;
 }
 

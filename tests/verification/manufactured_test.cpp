@@ -1,8 +1,10 @@
 #include "manufactured.hpp"
-#include "order.hpp"
+
+#include <fmt/format.h>
 
 #include <catch2/catch.hpp>
-#include <fmt/format.h>
+
+#include "order.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::manufactured;
@@ -25,9 +27,9 @@ void show(const std::string& text) {
 }
 
 std::string name(const FluidSettings& s) {
-  return fmt::format("{}, convection {}", s.projection == Projection::iterated ? "iterated" : "fractional step",
-                     s.convection == Convection::none ? "none"
-                                                      : (s.convection == Convection::implicit ? "implicit" : "extrapolated"));
+  return fmt::format(
+      "{}, convection {}", s.projection == Projection::iterated ? "iterated" : "fractional step",
+      s.convection == Convection::none ? "none" : (s.convection == Convection::implicit ? "implicit" : "extrapolated"));
 }
 
 }  // namespace
@@ -96,7 +98,7 @@ TEST_CASE("iterating the projection removes the splitting error of viscous flow"
   }
   show(fmt::format("error in time {:.2e} with one pass, {:.2e} iterated; with the error in space {:.2e}", split[0],
                    split[1], total));
-  CHECK(split[0] < 4e-4);             // measured 2.9e-4: below a tenth of the error in space of this grid
-  CHECK(split[1] < 0.2 * split[0]);   // measured 2.0e-5
+  CHECK(split[0] < 4e-4);            // measured 2.9e-4: below a tenth of the error in space of this grid
+  CHECK(split[1] < 0.2 * split[0]);  // measured 2.0e-5
   CHECK(total > 5 * split[0]);
 }

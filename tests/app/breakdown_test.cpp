@@ -1,0 +1,50 @@
+// A computation that breaks down: exit code 3, a message that says what, where, when, why and from where to go on.
+#include <cmath>
+
+#include "program.hpp"
+
+using namespace app;
+using Catch::Contains;
+
+TEST_CASE("nothing converges in too few iterations, and the message says so") {
+  const auto folder = fresh_folder("iterations");
+  fail(folder, coarse_tube("out", {"time.end_us=4", "coupling.scheme=aitken", "coupling.max_iterations=1"}), 3,
+       {"broke down", "at 1 us (step 1)", "coupling", "interface velocity", "coupling.max_iterations",
+        "Last good checkpoint: none yet"});
+  fail(folder, coarse_tube("out", {"time.end_us=4", "fluid.max_iterations=3"}), 3,
+       {"broke down", "at 1 us (step 1)", "velocity", "momentum equation", "fluid.max_iterations",
+        "Last good checkpoint: none yet"});
+  REQUIRE_FALSE(fs::exists(folder / "out/report.json"));
+}
+
+TEST_CASE("a cell carried out of the grid: the last good checkpoint is named, and can be gone on from") {
+  const auto folder = fresh_folder("carried_out");
+  // A flow a hundred times the case's carries the cell, 2.5 um from the end of the tube, into it within ten steps.
+  const auto fast = [](const std::string& out, const std::string& end) {
+    return coarse_tube(
+        out, {"cells.0.center_um=[0,0,20]", "boundary.0.velocity_mm_per_s=200", end, "output.checkpoint_every_us=3"});
+  };
+  const auto outcome =
+      fail(folder, fast("out", "time.end_us=30"), 3,
+           {"broke down at ", " us (step ", "position: body 0, vertex ", "outside the grid", "time.end_us"});
+  REQUIRE_FALSE(fs::exists(folder / "out/report.json"));
+  const auto h = history(folder / "out");
+  REQUIRE(h.lines.size() > 3);
+  for (const auto& line : h.lines)
+    for (const auto& field : line) REQUIRE(std::isfinite(std::stod(field)));
+#ifdef CORPUSCLE_HDF5
+  REQUIRE_THAT(outcome.output, Contains("Last good checkpoint: out/checkpoint.h5"));
+  const double last = h.number(h.lines.size() - 1, "time_us"), stored = 3 * std::floor(last / 3);
+  auto again = fast("again", "time.end_us=" + std::to_string(static_cast<int>(stored) + 1));
+  again.insert(again.end(), {"--restart", "out/checkpoint.h5"});
+  REQUIRE_THAT(succeed(folder, again).output,
+               Contains("continuing from " + std::to_string(static_cast<int>(stored)) + " us"));
+  // The checkpoint that a run starts from is a good one until there is a later one.
+  auto broken = fast("broken", "time.end_us=30");
+  broken.insert(broken.end(), {"--restart", "out/checkpoint.h5", "--set", "output.checkpoint_every_us=0"});
+  fail(folder, broken, 3, {"Last good checkpoint: out/checkpoint.h5"});
+#else
+  REQUIRE_THAT(outcome.output, Contains("Last good checkpoint: none"));
+  WARN("skipped: going on from the checkpoint, because this build has no HDF5");
+#endif
+}

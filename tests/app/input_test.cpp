@@ -1,0 +1,207 @@
+// Wrong input: exit code 2, and a message that names what is wrong and what to do, whichever part of the program finds
+// it.
+#include "program.hpp"
+
+using namespace app;
+using Catch::Contains;
+
+namespace {
+
+/// The coarse tube with one thing wrong.
+void refuse(const std::string& setting, const Words& parts) {
+  const auto folder = fresh_folder("refused");
+  const auto outcome = fail(folder, coarse_tube("out", {"time.end_us=4", setting}), 2, parts);
+  INFO(outcome.output);
+  REQUIRE_FALSE(fs::exists(folder / "out/report.json"));
+}
+
+// The mesh of a cell, whole or damaged: `spoil` gets the lines of the triangles.
+template <class Spoil>
+std::string mesh_file(const fs::path& folder, const std::string& name, const Spoil& spoil) {
+  succeed(folder, {"mesh", "--vertices", "500", "-o", "whole.off"});
+  std::istringstream in(contents(folder / "whole.off"));
+  std::string line, vertices;
+  std::getline(in, line);
+  std::getline(in, line);
+  for (int v = 0; v < 500 && std::getline(in, line); ++v) vertices += line + "\n";
+  Words triangles;
+  while (std::getline(in, line))
+    if (!line.empty()) triangles.push_back(line);
+  REQUIRE(triangles.size() == 996);
+  spoil(triangles);
+  std::ofstream out(folder / name);
+  out << "OFF\n500 " << triangles.size() << " 0\n" << vertices;
+  for (const auto& triangle : triangles) out << triangle << "\n";
+  return (folder / name).string();
+}
+
+void open(Words& triangles) { triangles.pop_back(); }
+
+void turn_inside_out(Words& triangles) {
+  for (auto& triangle : triangles) {
+    std::istringstream in(triangle);
+    std::string count, a, b, c;
+    in >> count >> a >> b >> c;
+    triangle = count + " " + a + " " + c + " " + b;
+  }
+}
+
+// The straight tube without the line that asks for the built-in mesh.
+std::string case_for_mesh(const fs::path& folder) {
+  auto text = contents(scene("straight_tube"));
+  const auto at = text.find("vertices = 500\n");
+  REQUIRE(at != std::string::npos);
+  std::ofstream(folder / "mesh.toml") << text.erase(at, std::string("vertices = 500\n").size());
+  return (folder / "mesh.toml").string();
+}
+
+// The tube flow with a body from a file.
+std::string case_for_body(const fs::path& folder, const std::string& file) {
+  std::ofstream(folder / "body.toml") << contents(scene("tube_flow")) << "\n[[bodies]]\nshape = \"file\"\nfile = \""
+                                      << file << "\"\ncenter_um = [0, 0, 0]\n";
+  return (folder / "body.toml").string();
+}
+
+}  // namespace
+
+TEST_CASE("wrong keys and values") {
+  refuse("time.stp_us=1", {"--set time.stp_us=1", "unknown key", "did you mean 'step_us'?"});
+  refuse("time.step=1", {"unknown key", "did you mean 'step_us'?", "unit"});
+  refuse("time.step_us=\"fast\"", {"time.step_us = \"fast\"", "a number above 0"});
+  refuse("fluid.density_pg_per_um3=-1", {"fluid.density_pg_per_um3 = -1", "a number above 0"});
+  refuse("cells.0.vertices=50", {"cells.0.vertices = 50", "200 to 30000"});
+  refuse("coupling.scheme=robbin", {"coupling.scheme", "did you mean \"robin\"?"});
+  refuse("time.end_us=4.5", {"time.end_us = 4.5", "time.step_us", "use 5"});
+}
+
+TEST_CASE("an error is announced once") {
+  const auto outcome = start(fresh_folder("once"), {"run", "nowhere.toml"});
+  INFO(outcome.output);
+  REQUIRE(outcome.output.find("error") == outcome.output.rfind("error"));
+}
+
+TEST_CASE("case files that cannot be read") {
+  const auto folder = fresh_folder("case_files");
+  for (const char* command : {"run", "check"}) {
+    fail(folder, {command, "nowhere.toml"}, 2, {"nowhere.toml", "cannot read"});
+    fail(folder, {command, "."}, 2, {"."});
+  }
+  std::ofstream(folder / "broken.toml") << "[time]\nstep_us = [\n";
+  fail(folder, {"run", "broken.toml"}, 2, {"broken.toml:", "not valid TOML"});
+}
+
+TEST_CASE("cells where they cannot be") {
+  SECTION("beyond the end of the grid") {
+    refuse("cells.0.center_um=[0,0,200]", {"body 0", "outside the grid", "center_um"});
+  }
+  SECTION("through the end of the grid") {
+    refuse("cells.0.center_um=[0,0,22]", {"body 0", "outside the grid", "center_um"});
+  }
+  SECTION("beside the tube") { refuse("cells.0.center_um=[40,0,0]", {"body 0", "outside the grid", "center_um"}); }
+  SECTION("through the wall") { refuse("cells.0.center_um=[3,0,0]", {"body 0", "outside the grid", "center_um"}); }
+  // The resting cell's radius is 3.9 um in a tube of 5 um: this leaves 0.5 um, less than one spacing of the coarse
+  // grid.
+  SECTION("too near to the wall") {
+    refuse("cells.0.center_um=[0.6,0,0]", {"gap to the wall", "body 0", "grid spacings", "center_um", "grid.nodes"});
+  }
+}
+
+TEST_CASE("surfaces that are open or inside out") {
+  const auto folder = fresh_folder("surfaces");
+  const auto whole = mesh_file(folder, "same.off", [](Words&) {});
+  const auto open_mesh = mesh_file(folder, "open.off", open);
+  const auto turned = mesh_file(folder, "turned.off", turn_inside_out);
+  const Words settings{"grid.nodes=[17,17,25]", "time.end_us=1"};
+  const auto cell = [&](const std::string& file) {
+    auto all = settings;
+    all.push_back("cells.0.mesh=\"" + file + "\"");
+    return with({"run", case_for_mesh(folder), "--out", "out"}, all);
+  };
+  const auto body = [&](const std::string& file) {
+    return with({"run", case_for_body(folder, file), "--out", "out"}, settings);
+  };
+  succeed(folder, cell(whole));
+  succeed(folder, body(whole));
+  for (const auto& words : {cell(open_mesh), body(open_mesh)})
+    fail(folder, words, 2, {"open.off", "open", "edge between vertices", "close the hole"});
+  for (const auto& words : {cell(turned), body(turned)})
+    fail(folder, words, 2, {"turned.off", "inside-out", "reverse the vertex order"});
+  fail(folder, cell((folder / "missing.off").string()), 2, {"cells.0.mesh", "missing.off", "no file"});
+}
+
+TEST_CASE("results that cannot be written") {
+  const auto folder = fresh_folder("unwritable");
+  std::ofstream(folder / "file") << "in the way\n";
+  fail(folder, coarse_tube("file"), 2, {"--out file", "cannot create this folder"});
+  fail(folder, coarse_tube("file/out"), 2, {"--out file/out", "cannot create this folder"});
+}
+
+TEST_CASE("a coupling that cannot be stable is refused with the reason") {
+  refuse("coupling.scheme=loose", {"coupling", "M / (A dt)", "would diverge", "robin", "cells.0.mass_pg", "aitken"});
+}
+
+TEST_CASE("more ranks than the case can use") {
+#ifdef CORPUSCLE_MPI
+  const auto folder = fresh_folder("ranks");
+  // Four cells a side are too few for two blocks of three.
+  fail(folder, with({"run", scene("couette")}, {"grid.nodes=[5,5,5]", "time.end_us=2"}), 2,
+       {"4 x 4 x 4 cells cannot be cut into 4 blocks", "fewer ranks", "grid.nodes"}, {1, 4});
+  fail(folder, {"run", scene("stretch")}, 2, {"stretching", "one rank, not 2", "without mpirun"}, {1, 2});
+#else
+  WARN("skipped: this build has no MPI");
+#endif
+}
+
+#ifdef CORPUSCLE_HDF5
+
+TEST_CASE("checkpoints that do not fit") {
+  static const auto folder = fresh_folder("checkpoints");
+  static const bool ready = (succeed(folder, coarse_tube("good", {"time.end_us=2"})), true);
+  REQUIRE(ready);
+  const auto refuse_restart = [](Words words, const std::string& file, const Words& parts) {
+    words.insert(words.end(), {"--restart", file});
+    fail(folder, words, 2, parts);
+  };
+  const auto again = coarse_tube("out", {"time.end_us=4"});
+  SECTION("no checkpoint at all") {
+    std::ofstream(folder / "text.h5") << "not HDF5, and long enough to hold a signature\n";
+    refuse_restart(again, "missing.h5", {"missing.h5", "no such file"});
+    refuse_restart(again, "text.h5", {"text.h5", "not an HDF5 file"});
+    refuse_restart(again, "good/fields.h5", {"good/fields.h5", "not a checkpoint"});
+  }
+  SECTION("cut short") {
+    fs::copy_file(folder / "good/checkpoint.h5", folder / "short.h5", fs::copy_options::overwrite_existing);
+    fs::resize_file(folder / "short.h5", fs::file_size(folder / "short.h5") / 2);
+    refuse_restart(again, "short.h5", {"short.h5", "cut short"});
+  }
+  SECTION("of another grid") {
+    refuse_restart(coarse_tube("out", {"time.end_us=4", "grid.nodes=[17,17,27]"}), "good/checkpoint.h5",
+                   {"[17, 17, 25]", "grid.nodes = [17, 17, 27]"});
+  }
+  SECTION("of another cell") {
+    refuse_restart(coarse_tube("out", {"time.end_us=4", "cells.0.vertices=400"}), "good/checkpoint.h5",
+                   {"good/checkpoint.h5", "membranes"});
+  }
+  SECTION("with a cell, for a case without") {
+    refuse_restart(with({"run", scene("tube_flow"), "--out", "out"}, {"grid.nodes=[17,17,25]"}), "good/checkpoint.h5",
+                   {"good/checkpoint.h5", "another scene"});
+  }
+  SECTION("without a cell, for a case with one") {
+    succeed(folder, with({"run", scene("tube_flow"), "--out", "plain"}, {"grid.nodes=[17,17,25]", "time.end_us=2"}));
+    refuse_restart(again, "plain/checkpoint.h5", {"plain/checkpoint.h5", "membranes", "another scene"});
+  }
+  SECTION("of another step: its step number is no time in this case") {
+    refuse_restart(coarse_tube("out", {"time.end_us=4", "time.step_us=0.5"}), "good/checkpoint.h5",
+                   {"good/checkpoint.h5", "time.step_us"});
+  }
+  SECTION("at the end already") {
+    refuse_restart(coarse_tube("out", {"time.end_us=2"}), "good/checkpoint.h5", {"2 us", "time.end_us"});
+  }
+  SECTION("for a stretching test") {
+    refuse_restart({"run", scene("stretch")}, "good/checkpoint.h5", {"--restart", "stretching"});
+  }
+}
+
+#else
+TEST_CASE("checkpoints that do not fit") { WARN("skipped: this build has no HDF5"); }
+#endif

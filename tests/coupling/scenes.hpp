@@ -1,0 +1,61 @@
+// Scenes for the tests of coupled runs, built in code.
+#pragma once
+
+#include "coupling/flow_simulation.hpp"
+
+#include <cmath>
+
+namespace corpuscle::scenes {
+
+inline std::vector<BoundarySettings> sides(BoundarySettings::Type type) {
+  std::vector<BoundarySettings> all(6);
+  for (int s = 0; s < 6; ++s) {
+    all[s].side = static_cast<BoundarySettings::Side>(s);
+    all[s].type = type;
+  }
+  return all;
+}
+
+/// Cubic box of `cells` a side around the origin.
+inline GridSettings cube(double side_um, int cells) {
+  GridSettings grid;
+  grid.nodes = {cells + 1, cells + 1, cells + 1};
+  grid.lower_um = {-side_um / 2, -side_um / 2, -side_um / 2};
+  grid.upper_um = {side_um / 2, side_um / 2, side_um / 2};
+  return grid;
+}
+
+/// Sphere whose centre avoids every symmetry of the grid.
+inline BodySettings sphere(double radius_um) {
+  BodySettings body;
+  body.radius_um = radius_um;
+  body.center_um = {0.013, 0.021, 0.017};
+  return body;
+}
+
+/// The paper's tube with one cell on a grid of n x n x nk nodes, Stokes flow.
+inline Case tube_with_cell(int n, int nk, double mass_pg, CouplingSettings::Scheme scheme, double end_us) {
+  Case scene;
+  scene.time = {1, end_us};
+  GridSettings grid;
+  grid.generator = GridSettings::Generator::straight_tube;
+  grid.nodes = {n, n, nk};
+  grid.diameter_um = 10;
+  grid.length_um = 45;
+  scene.grid = grid;
+  scene.fluid = FluidSettings{};
+  scene.fluid->convection = FluidSettings::Convection::none;
+  scene.boundaries = sides(BoundarySettings::Type::wall);
+  scene.boundaries[4].type = BoundarySettings::Type::velocity_inlet;
+  scene.boundaries[4].speed = 2e-3;
+  scene.boundaries[4].ramp_us = 20;
+  scene.boundaries[5].type = BoundarySettings::Type::outflow;
+  CellSettings cell;
+  cell.mass_pg = mass_pg;
+  scene.cells = {cell};
+  scene.coupling = CouplingSettings{};
+  scene.coupling->scheme = scheme;
+  return scene;
+}
+
+}  // namespace corpuscle::scenes
