@@ -142,8 +142,10 @@ void FlowSimulation::step_staggered(double dt) {
   statistics_.coupling_residual = norms.answer > 0 ? std::sqrt(norms.residual / norms.answer) : 0;
 }
 
-/// Fixed point on the mean velocity of the interface over the step, with Aitken's relaxation (Kuettler and Wall,
-/// Comput. Mech. 43, 2008): fluid with that velocity, membrane with the tractions, compare.
+/// Fixed point on the mean velocity of the interface over the step: fluid with that velocity, membrane with the
+/// tractions, compare. With the Robin term a pass multiplies the error of a mode on which the fluid reacts with Lambda
+/// by (beta - Lambda) / (M / (A dt) + beta), below one for every mode, so nothing is relaxed; without it the factor is
+/// -Lambda A dt / M and Aitken's relaxation (Kuettler and Wall, Comput. Mech. 43, 2008) makes it converge.
 void FlowSimulation::step_iterated(double dt) {
   const auto& coupling = *scene_.coupling;
   const int n = membranes_->vertices();
@@ -167,7 +169,7 @@ void FlowSimulation::step_iterated(double dt) {
     statistics_.coupling_residual = residual;
     if (!std::isfinite(residual)) break;
     if (residual <= coupling.tolerance) return;
-    if (k > 0 && norms.change > 0)
+    if (stability_.beta == 0 && k > 0 && norms.change > 0)
       relaxation_ = std::clamp(-relaxation_ * norms.product / norms.change, 0.005, 1.5);
     relax_interface(n, relaxation_, residual_, v_interface_, previous_residual_);
   }

@@ -124,7 +124,7 @@ struct CouplingSettings {
 
   Scheme scheme = Scheme::robin;
   double tolerance = 1e-3;              // aitken: residual over the step's displacement
-  int max_iterations = 50;              // aitken
+  int max_iterations = 200;             // aitken
   double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see estimate_stability)
   bool robin_in_aitken = true;
 
