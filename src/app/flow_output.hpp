@@ -23,6 +23,8 @@ class FlowOutput {
   /// The state as it is, at the end of a run that has finished or broken down.
   void write_checkpoint_now();
   const std::string& last_checkpoint() const { return last_checkpoint_; }
+  /// The checkpoint that the run was started from is good until a newer one is written.
+  void started_from(const std::string& checkpoint) { last_checkpoint_ = checkpoint; }
   /// Errors, iterations and counts gathered over the run.
   void fill(Report& report);
 

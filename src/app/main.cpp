@@ -45,7 +45,7 @@ int run_command(const Comm& comm, const std::function<void()>& command) {
     command();
     return 0;
   } catch (const InputError& error) {
-    complain(comm, fmt::format("error: {}", error.what()));
+    complain(comm, error.what());
     leave(comm, input_is_wrong);
   } catch (const ComputationError& error) {
     complain(comm, fmt::format("the computation broke down {}", error.what()));

@@ -79,6 +79,7 @@ void run_flow(const Comm& comm, const Case& scene, const RunOptions& options, co
     throw InputError("--restart: this build has no HDF5, so it has no checkpoints; configure with -DCORPUSCLE_HDF5=ON");
 #endif
   FlowOutput output(folder, scene, simulation, timers, restart_us);
+  output.started_from(options.restart);
   if (!restart_us) output.after_step(true);
   Report report = start_report(comm, scene);
   Progress progress(scene.time.end_us, simulation.total_steps() - simulation.steps());
@@ -179,7 +180,10 @@ std::string result_folder(const RunOptions& options) {
 void run_case(const Comm& comm, const RunOptions& options) {
   const Case scene = read_case(options.case_path, options.overrides);
   const std::string folder = result_folder(options);
-  on_root(comm, [&] { prepare_folder(folder); });
+  on_root(comm, [&] {
+    prepare_folder(folder);
+    std::filesystem::remove(folder + "/report.json");  // of an earlier run: this one may not get to write its own
+  });
   print_start(comm, scene);
   if (scene.stretching) {
     if (!options.restart.empty()) throw InputError("--restart: a stretching test has no checkpoints; run it again");
@@ -197,7 +201,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
   if (scene.stretching) {
     Membranes membranes(scene.cells);
     info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
-    info("estimate: {:.0f} MB, {:.2g} s", peak_rss_mb(), 1.2e-6 * membranes.vertices() * 3000.0 * scene.stretching->steps);
+    info("estimate: {:.0f} MB, {:.2g} s", peak_rss_mb(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
     info("{} is valid", scene.path);
     return;
   }
@@ -225,8 +229,12 @@ void check_case(const Comm& comm, const RunOptions& options) {
 }
 
 void write_mesh(int vertices, const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  const bool stl = extension == ".stl";
+  if (!stl && extension != ".off")
+    throw InputError(fmt::format("{}: cannot write a mesh as \"{}\"; use a name that ends in .off or .stl", path,
+                                 extension));
   const TriangleMesh mesh = biconcave_mesh(vertices);
-  const bool stl = std::filesystem::path(path).extension() == ".stl";
   if (stl)
     write_stl(path, mesh, StlFormat::binary);
   else

@@ -33,6 +33,7 @@ class FlowSimulation {
   void step();
 
   double time() const { return time_; }
+  double step_us() const { return scene_.time.step_us; }
   long steps() const { return steps_; }
   long total_steps() const { return total_steps_; }
   bool done() const { return steps_ >= total_steps_; }

@@ -26,14 +26,23 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
   traction_host_ = Kokkos::create_mirror_view(traction_);
 }
 
+/// The lowest vertex that no rank finds in its block. For error messages: copies to the host.
+int ImmersedFlow::first_unowned_vertex() {
+  std::vector<double> owners;
+  for (char owned : boundary_->owned_vertices()) owners.push_back(owned);
+  fluid_.grid().comm().sum(owners.data(), static_cast<int>(owners.size()));
+  return static_cast<int>(std::find(owners.begin(), owners.end(), 0.0) - owners.begin());
+}
+
 void ImmersedFlow::check_positions(double smallest_gap) {
   const auto& counts = boundary_->counts();
   const Comm& comm = fluid_.grid().comm();
   const double nearest = comm.min(counts.wall_spacings);
   report_.least_wall_spacings = std::min(report_.least_wall_spacings, nearest);
-  const bool lost = comm.max(counts.lost_vertex >= 0 ? 1.0 : 0.0) > 0;
-  if (lost) {
-    const int vertex = static_cast<int>(comm.max(static_cast<double>(counts.lost_vertex)));
+  const long found = comm.sum(static_cast<long>(counts.owned_vertices));
+  int vertex = static_cast<int>(comm.max(static_cast<double>(counts.lost_vertex)));
+  if (vertex >= 0 || found < surfaces_.vertices) {
+    if (vertex < 0) vertex = first_unowned_vertex();
     throw ComputationError(fmt::format(
         "position: {} lies outside the grid. Likely cause: the cell was placed there, has reached the end of the grid, "
         "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
@@ -41,7 +50,7 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   }
   if (nearest < smallest_gap) {
     const bool here = counts.wall_spacings == nearest;
-    const int vertex = static_cast<int>(comm.max(here ? static_cast<double>(counts.wall_vertex) : -1.0));
+    vertex = static_cast<int>(comm.max(here ? static_cast<double>(counts.wall_vertex) : -1.0));
     throw ComputationError(fmt::format(
         "gap to the wall: {} is {:.2f} grid spacings from a wall, and {:.2f} are needed to resolve the film between "
         "them. Contact forces do not exist yet: move or tilt the cell (center_um, axis), refine the grid (grid.nodes) "

@@ -51,6 +51,7 @@ class ImmersedFlow {
   const EmbeddedBodies& bodies() const { return bodies_; }
 
  private:
+  int first_unowned_vertex();
   void check_positions(double smallest_gap);
   void check_resolution();
 

@@ -2,10 +2,11 @@
 
 #ifdef CORPUSCLE_HDF5
 
+#include "core/error.hpp"
 #include "output/checkpoint.hpp"
 #include "output/owned_values.hpp"
 
-#include <cstring>
+#include <fmt/format.h>
 
 namespace corpuscle {
 
@@ -45,6 +46,18 @@ CellBox face_range(const IndexSpace& index, int d) {
 
 CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}; }
 
+/// A checkpoint with cells does not fit a case without, nor one with other bodies.
+void require_same_parts(const std::string& path, const CheckpointReader& file, FlowSimulation& simulation) {
+  const auto compare = [&](const char* name, bool here, const char* what) {
+    if (file.has(name) && !here)
+      throw InputError(fmt::format("{}: holds {}, and this case has none; use the case it was written by", path, what));
+    if (!file.has(name) && here)
+      throw InputError(fmt::format("{}: holds no {}, and this case has some; use the case it was written by", path, what));
+  };
+  compare("membranes", simulation.membranes() != nullptr, "cells");
+  compare("locations", simulation.immersed() != nullptr, "cells or bodies");
+}
+
 const char* flux_name(int d) { return std::array<const char*, 3>{"flux_i", "flux_j", "flux_k"}[d]; }
 const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i", "flux_old_j", "flux_old_k"}[d]; }
 
@@ -76,8 +89,8 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
       file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d),
                box_values(index, faces, state.flux_old[d]).data());
   }
-  const double numbers[2] = {state.reference_speed, progress.relaxation};
-  file.add("numbers", {2}, numbers);
+  const double numbers[3] = {state.reference_speed, progress.relaxation, simulation.step_us()};
+  file.add("numbers", {3}, numbers);
   const std::int64_t counts[3] = {state.history_levels, state.iterations_after_setup, state.last_iterations};
   file.add("counts", {3}, counts);
   if (simulation.membranes()) {
@@ -95,6 +108,7 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   const IndexSpace& index = simulation.grid().index();
   const CheckpointReader file(path);
   file.require_grid({index.global[0], index.global[1], index.global[2]});
+  require_same_parts(path, file, simulation);
   FluidSolver& fluid = simulation.fluid();
   auto state = fluid.state().copy();
   const CellBox owned = owned_box(index);
@@ -126,11 +140,17 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
       set_box_values(index, faces, flux, state.flux_old[d]);
     }
   }
-  double numbers[2];
-  file.read("numbers", {2}, numbers);
+  double numbers[3];
+  file.read("numbers", {3}, numbers);
+  if (numbers[2] != simulation.step_us())
+    throw InputError(fmt::format("{}: written with time.step_us = {}, and this case has {}: second-order steps cannot "
+                                 "change their length; use the same step",
+                                 path, numbers[2], simulation.step_us()));
   std::int64_t counts[3];
   file.read("counts", {3}, counts);
   state.reference_speed = numbers[0];
+  state.time_us = file.header().time_us;
+  state.step_us = numbers[2];
   state.history_levels = static_cast<int>(counts[0]);
   state.iterations_after_setup = static_cast<int>(counts[1]);
   state.last_iterations = static_cast<int>(counts[2]);
@@ -144,7 +164,6 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
     file.read("locations", {places.size()}, places.data());
     simulation.immersed()->boundary().set_location_state(places);
   }
-  fluid.boundaries().set_time(file.header().time_us);
   fluid.restore(state);
   simulation.resume({file.header().time_us, numbers[1], file.header().step});
 }

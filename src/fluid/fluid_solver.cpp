@@ -383,8 +383,10 @@ void FluidSolver::restore(const State& state) {
   grid_->halo().exchange(u_);
   grid_->halo().exchange(u_old_);
   grid_->halo().exchange(p_);
-  boundaries_.fill(u_);
+  boundaries_.set_time(state.time_us - state.step_us);
   boundaries_.fill(u_old_);
+  boundaries_.set_time(state.time_us);
+  boundaries_.fill(u_);
   if (!state.kind_at_setup.data()) return;
   Kokkos::deep_copy(kind_at_setup_, state.kind_at_setup);
   grid_->halo().exchange(kind_at_setup_);

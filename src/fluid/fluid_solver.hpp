@@ -79,6 +79,7 @@ class FluidSolver {
     Array<NodeKind> kind_at_setup;        // node kinds when the pressure preconditioner was set up
     int history_levels = 0;               // how many earlier velocities are valid
     double reference_speed = 0;
+    double time_us = 0, step_us = 0;      // of u, and from u_old to u: boundary velocities are those of these times
     int iterations_after_setup = -1, last_iterations = 0;
     /// The same with memory of its own.
     State copy() const;

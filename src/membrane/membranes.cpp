@@ -142,6 +142,8 @@ int Membranes::advance(double dt_us, const Components<double>& traction, double 
   }
   if (calls_ % estimate_period == 0) estimate_stiffness();
   ++calls_;
+  // The solver of the volume constraint starts from nothing, so that a step depends on the state alone.
+  if (viscosity_) Kokkos::deep_copy(motion_.direction, 0.0);
   const int planned = substeps(dt_us, beta);
   copy_motion(views_.vertices, views_.surface.x, views_.surface.v, start_x_, start_v_);
   for (int attempt = 0; attempt <= most_retries; ++attempt) {
@@ -181,13 +183,13 @@ void Membranes::explain(int cell, double dt) {
     throw ComputationError(fmt::format(
         "membrane overstretched: {}: a link reached {:.3f} of its contour length{} ({:.3f} before). The load "
         "is too large or the coupling unstable: reduce time.step_us or the load, or raise "
-        "cells.shear_modulus_uN_per_m or coupling.robin_coefficient",
+        "cells.shear_modulus_uN_per_m or coupling.robin_coefficient_pg_per_um2_per_us",
         where, now.stretch, step, before.stretch));
   }
   throw ComputationError(fmt::format(
       "membrane position is not finite: {}{} (largest stretch before: {:.3f} of the contour length). The traction on "
       "it "
-      "is not finite or the step too long: reduce time.step_us, or raise cells.mass_pg or coupling.robin_coefficient",
+      "is not finite or the step too long: reduce time.step_us, or raise cells.mass_pg or coupling.robin_coefficient_pg_per_um2_per_us",
       where, step, before.stretch));
 }
 

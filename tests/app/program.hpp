@@ -26,9 +26,19 @@ namespace fs = std::filesystem;
 /// Path of a case file.
 inline std::string scene(const std::string& name) { return CORPUSCLE_SOURCE_DIR "/cases/" + name + ".toml"; }
 
+/// What this process writes; goes when it ends.
+struct TemporaryFolder {
+  fs::path path = fs::temp_directory_path() / ("corpuscle_app_" + std::to_string(::getpid()));
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+};
+
 /// Empty, and of this process alone.
 inline fs::path fresh_folder(const std::string& name) {
-  const auto folder = fs::temp_directory_path() / ("corpuscle_app_" + std::to_string(::getpid())) / name;
+  static const TemporaryFolder all;
+  const auto folder = all.path / name;
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
@@ -69,10 +79,11 @@ struct Outcome {
   std::string output;  // what went to the screen
 };
 
-/// Run the program in `folder` and wait for it.
+/// Run the program in `folder` and wait for it. Its threads yield while they wait: on a machine with other work, or
+/// with one core, they would spend most of their time in each other's way.
 inline Outcome start(const fs::path& folder, const Words& words, const Launch& launch = {}) {
   std::string command = "cd " + quoted(folder.string()) + " && timeout 120 env" + without_mpi_environment() +
-                        " OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
+                        " OMP_WAIT_POLICY=passive OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
   if (launch.ranks > 1)
     command += "mpirun -n " + std::to_string(launch.ranks) + " --oversubscribe --allow-run-as-root ";
   command += quoted(CORPUSCLE_PROGRAM);
