@@ -18,10 +18,12 @@ const std::vector<std::string> shape_columns = {"rear_hollow_um", "front_dimple_
 /// Further columns of rigid bodies: the force from the fluid's momentum balance, beside that from tractions.
 const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance_force_y_nN", "balance_force_z_nN"};
 
+#ifdef CORPUSCLE_HDF5
 std::vector<std::int32_t> to_int32(const Table<int>& table) {
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
   return {host.data(), host.data() + host.span()};
 }
+#endif
 
 }  // namespace
 

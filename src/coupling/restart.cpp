@@ -50,9 +50,9 @@ CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], ind
 void require_same_parts(const std::string& path, const CheckpointReader& file, FlowSimulation& simulation) {
   const auto compare = [&](const char* name, bool here, const char* what) {
     if (file.has(name) && !here)
-      throw InputError(fmt::format("{}: holds {}, and this case has none; use the case it was written by", path, what));
+      throw InputError(fmt::format("{}: is of another scene: it holds {} ({}), and this case has none", path, what, name));
     if (!file.has(name) && here)
-      throw InputError(fmt::format("{}: holds no {}, and this case has some; use the case it was written by", path, what));
+      throw InputError(fmt::format("{}: is of another scene: it holds no {} ({}), and this case has some", path, what, name));
   };
   compare("membranes", simulation.membranes() != nullptr, "cells");
   compare("locations", simulation.immersed() != nullptr, "cells or bodies");
