@@ -121,11 +121,12 @@ KOKKOS_INLINE_FUNCTION Vec3 viscous_force(const ViscousCoefficients& g, const Ve
     const ViscousStencil stencil(g, index, c);
     force = {stencil.apply(u, index, c, 0), stencil.apply(u, index, c, 1), stencil.apply(u, index, c, 2)};
   } else {
-    for (int d = 0; d < 3; ++d) {
-      const int s = index.stride(d);
-      const double high = g.normal[d](c + s), low = g.normal[d](c);
-      force += high * (load(u, c + s) - load(u, c)) - low * (load(u, c) - load(u, c - s));
-    }
+    // Written out, not looped over directions: a loop in here would keep compilers from vectorising over cells.
+    const int s1 = index.stride(1), s2 = index.stride(2);
+    const Vec3 here = load(u, c);
+    force = g.normal[0](c + 1) * (load(u, c + 1) - here) - g.normal[0](c) * (here - load(u, c - 1)) +
+            g.normal[1](c + s1) * (load(u, c + s1) - here) - g.normal[1](c) * (here - load(u, c - s1)) +
+            g.normal[2](c + s2) * (load(u, c + s2) - here) - g.normal[2](c) * (here - load(u, c - s2));
   }
   return force;
 }
@@ -140,9 +141,9 @@ KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, No
 }
 
 /// out = D^-1 A u on owned cells, compact order with component m at offset m * owned.
-///  fluid:    mass V u - mu (viscous fluxes) [+ rho (convective fluxes with the given face fluxes)]
+///  fluid:    mass V u - mu (viscous fluxes) + rho (convective fluxes with the given face fluxes)
 ///  others:   0 (immersed velocities are eliminated: u holds what their rows make of the fluid's)
-template <bool skewed, bool convective, class Velocity>
+template <bool skewed, class Velocity>
 void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
                     const Array<double>& diagonal, double mass, double mu, double rho, const Array<double> (&flux)[3],
                     const Velocity& u, const Array<double>& out) {
@@ -160,13 +161,11 @@ void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const A
     const Vec3 viscous = viscous_force<skewed>(g, u, index, c);
     for (int m = 0; m < 3; ++m) {
       double sum = inertia * u(c, m) - mu * viscous[m];
-      if (convective) {  // not constexpr, as above
-        for (int d = 0; d < 3; ++d) {
-          const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
-          const int next = c + index.stride(d), low = c - index.stride(d);
-          sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
-                        convective_face(u, f(c), kind(low), kind(c), low, c, m));
-        }
+      for (int d = 0; d < 3; ++d) {
+        const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
+        const int next = c + index.stride(d), low = c - index.stride(d);
+        sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
+                      convective_face(u, f(c), kind(low), kind(c), low, c, m));
       }
       out(e + m * owned) = sum * scale;
     }
@@ -218,30 +217,152 @@ inline void subtract_convection(const GridViews& grid, const Array<NodeKind>& ki
   });
 }
 
-/// rhs = D^-1 (history - V grad p) at fluid nodes, zero elsewhere.
+/// rhs [cell, 3] = D^-1 (history - V grad p) at fluid nodes, zero elsewhere.
 inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, const Array<double>& diagonal,
                          const Components<double>& history, const Components<double>& grad_p,
-                         const Array<double>& rhs) {
+                         const Components<double>& rhs) {
   const IndexSpace index = grid.index;
   const auto volume = grid.volume;
-  const int owned = index.owned();
   for_owned("corpuscle::fluid::momentum_rhs", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
-    const bool fluid = kind(c) == NodeKind::fluid;
-    const double scale = 1 / diagonal(c);
-    for (int m = 0; m < 3; ++m)
-      rhs(e + m * owned) = fluid ? scale * (history(c, m) - volume(c) * grad_p(c, m)) : 0.0;
+    const int c = index.cell(i, j, k);
+    const double scale = kind(c) == NodeKind::fluid ? 1 / diagonal(c) : 0.0;
+    for (int m = 0; m < 3; ++m) rhs(c, m) = scale * (history(c, m) - volume(c) * grad_p(c, m));
   });
 }
 
-/// Between the padded field and compact Krylov vectors.
-inline void compact_from_field(const IndexSpace& index, const Components<double>& field, const Array<double>& vector) {
+/// What the momentum operator, without convection, needs at a cell: A u = D^-1 (mass V u - mu (viscous fluxes)).
+struct MomentumOperator {
+  GridViews grid;
+  ViscousCoefficients g;
+  Array<double> inertia, scale;  // mass V / D and mu / D at fluid nodes, zero elsewhere
+
+  template <bool skewed>
+  KOKKOS_INLINE_FUNCTION Vec3 apply(const Components<double>& u, int c) const {
+    return inertia(c) * load(u, c) - scale(c) * viscous_force<skewed>(g, u, grid.index, c);
+  }
+};
+
+/// inertia = mass V / D, scale = mu / D at fluid nodes, zero elsewhere.
+inline void momentum_scales(const IndexSpace& index, const Array<double>& volume, const Array<NodeKind>& kind,
+                            const Array<double>& diagonal, double mass, double mu, const MomentumOperator& a) {
+  for_owned("corpuscle::fluid::momentum_scales", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const double inverse = kind(c) == NodeKind::fluid ? 1 / diagonal(c) : 0.0;
+    a.inertia(c) = mass * volume(c) * inverse;
+    a.scale(c) = mu * inverse;
+  });
+}
+
+/// Upper bound of the operator's eigenvalues on this rank, by Gershgorin's circles.
+template <bool skewed>
+double largest_row_sum(const MomentumOperator& a) {
+  const IndexSpace index = a.grid.index;
+  double largest = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::fluid::largest_row_sum", Policy(0, index.owned()),
+      KOKKOS_LAMBDA(int e, double& most) {
+        const int c = index.cell(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]));
+        double sum = 0;
+        if (skewed) {  // not constexpr, as above
+          const ViscousStencil s(a.g, index, c);
+          sum = -s.centre;
+          for (int d = 0; d < 3; ++d) {
+            for (int n = 0; n < 2; ++n) sum += s.axis[d][n] < 0 ? -s.axis[d][n] : s.axis[d][n];
+            for (int n = 0; n < 4; ++n) sum += s.edge[d][n] < 0 ? -s.edge[d][n] : s.edge[d][n];
+          }
+        } else {
+          for (int d = 0; d < 3; ++d) sum += 2 * (a.g.normal[d](c) + a.g.normal[d](c + index.stride(d)));
+        }
+        const double row = a.inertia(c) + a.scale(c) * sum;
+        if (row > most) most = row;
+      },
+      Kokkos::Max<double>(largest));
+  return largest;
+}
+
+/// Start vector of the Lanczos process: smooth modes above all, a little of every other, the same on any ranks.
+inline void lanczos_start(const MomentumOperator& a, const Components<double>& v) {
+  const IndexSpace index = a.grid.index;
+  for_owned("corpuscle::fluid::lanczos_start", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const double wave = 12.9 * (index.first[0] + i) + 78.2 * (index.first[1] + j) + 37.7 * (index.first[2] + k);
+    for (int m = 0; m < 3; ++m) v(c, m) = a.scale(c) > 0 ? 1 + 0.3 * std::sin(wave + m) : 0.0;
+  });
+}
+
+/// This rank's sum of D v . w, the inner product in which the operator is symmetric on an orthogonal grid. Over mu.
+inline double diagonal_dot(const MomentumOperator& a, const Components<double>& v, const Components<double>& w) {
+  const IndexSpace index = a.grid.index;
+  return sum_owned("corpuscle::fluid::diagonal_dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    return a.scale(c) > 0 ? dot(load(v, c), load(w, c)) / a.scale(c) : 0.0;
+  });
+}
+
+/// w = A v - beta w on owned cells.
+template <bool skewed>
+void lanczos_operator(const MomentumOperator& a, double beta, const Components<double>& v, const Components<double>& w) {
+  const IndexSpace index = a.grid.index;
+  for_owned("corpuscle::fluid::lanczos_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    store(w, c, a.apply<skewed>(v, c) - beta * load(w, c));
+  });
+}
+
+/// v = factor v - shift w on owned cells.
+inline void lanczos_combine(const IndexSpace& index, double factor, double shift, const Components<double>& w,
+                            const Components<double>& v) {
+  for_owned("corpuscle::fluid::lanczos_combine", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    store(v, c, factor * load(v, c) - shift * load(w, c));
+  });
+}
+
+/// previous = u + momentum (u - previous) + weight (rhs - A u) at fluid nodes, u at others: the next Chebyshev iterate
+/// takes the place of the one before.
+template <bool skewed>
+void momentum_step(const MomentumOperator& a, double momentum, double weight, const Components<double>& rhs,
+                   const Components<double>& u, const Components<double>& previous) {
+  const IndexSpace index = a.grid.index;
+  for_owned("corpuscle::fluid::momentum_step", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const bool fluid = a.scale(c) > 0;
+    const Vec3 here = load(u, c);
+    const Vec3 next = here + momentum * (here - load(previous, c)) + weight * (load(rhs, c) - a.apply<skewed>(u, c));
+    store(previous, c, fluid ? next : here);
+  });
+}
+
+/// This rank's sum of squares of rhs - A u over fluid nodes.
+template <bool skewed>
+double momentum_residual_square(const MomentumOperator& a, const Components<double>& rhs, const Components<double>& u) {
+  const IndexSpace index = a.grid.index;
+  return sum_owned("corpuscle::fluid::momentum_residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const Vec3 r = load(rhs, c) - a.apply<skewed>(u, c);
+    return a.scale(c) > 0 ? dot(r, r) : 0.0;
+  });
+}
+
+/// This rank's sum of squares of a vector field over owned cells.
+inline double square_of(const IndexSpace& index, const Components<double>& u) {
+  return sum_owned("corpuscle::fluid::square", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const Vec3 v = load(u, index.cell(i, j, k));
+    return dot(v, v);
+  });
+}
+
+/// Compact residual of the implicit convective operator: rhs - (what `applied` holds), component m at offset m * owned.
+inline void compact_residual(const IndexSpace& index, const Components<double>& rhs, const Array<double>& applied,
+                             const Array<double>& residual) {
   const int owned = index.owned();
-  for_owned("corpuscle::fluid::to_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    for (int m = 0; m < 3; ++m) vector(index.compact(i, j, k) + m * owned) = field(index.cell(i, j, k), m);
+  for_owned("corpuscle::fluid::compact_residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
+    for (int m = 0; m < 3; ++m) residual(e + m * owned) = rhs(c, m) - applied(e + m * owned);
   });
 }
 
+/// From compact Krylov vectors to the padded field.
 inline void field_from_compact(const IndexSpace& index, const Array<double>& vector, const Components<double>& field) {
   const int owned = index.owned();
   for_owned("corpuscle::fluid::from_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {

@@ -52,18 +52,26 @@ enum class NodeKind : std::int8_t {
   none = 4       // void layers
 };
 
-/// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper.
+/// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper. Cells must be independent of each other: on
+/// the host each line of cells along i is a vectorised loop.
 template <class Body>
 void for_box(const std::string& label, const std::array<int, 3>& lower, const std::array<int, 3>& upper,
              const Body& body) {
   if (upper[0] <= lower[0] || upper[1] <= lower[1] || upper[2] <= lower[2]) return;
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
   using Range = Kokkos::MDRangePolicy<Exec, Kokkos::Rank<3, Kokkos::Iterate::Left, Kokkos::Iterate::Left>,
                                       Kokkos::IndexType<int>>;
-#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
   Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
 #else
-  Kokkos::parallel_for(
-      label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {upper[0] - lower[0], 4, 1}), body);
+  const int ni = lower[0], ui = upper[0], nj = upper[1] - lower[1], lj = lower[1], lk = lower[2];
+  Kokkos::parallel_for(label, Policy(0, nj * (upper[2] - lk)), [=](int line) {
+    const int j = lj + line % nj, k = lk + line / nj;
+    const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
+    for (int i = ni; i < ui; ++i) cell(i, j, k);
+  });
 #endif
 }
 
@@ -71,6 +79,34 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
 template <class Body>
 void for_owned(const std::string& label, const IndexSpace& index, const Body& body) {
   for_box(label, {0, 0, 0}, {index.n[0], index.n[1], index.n[2]}, body);
+}
+
+/// Sum of `body(i, j, k)` over this rank's owned cells. The order of summation depends on the number of threads only.
+template <class Body>
+double sum_owned(const std::string& label, const IndexSpace& index, const Body& body) {
+  double sum = 0;
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  Kokkos::parallel_reduce(
+      label, Policy(0, index.owned()),
+      KOKKOS_LAMBDA(int e, double& total) {
+        total += body(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]));
+      },
+      sum);
+#else
+  const int ni = index.n[0], nj = index.n[1];
+  Kokkos::parallel_reduce(
+      label, Policy(0, nj * index.n[2]),
+      [=](int line, double& total) {
+        const int j = line % nj, k = line / nj;
+        const Body cell = body;
+        double part = 0;
+#pragma omp simd reduction(+ : part)
+        for (int i = 0; i < ni; ++i) part += cell(i, j, k);
+        total += part;
+      },
+      sum);
+#endif
+  return sum;
 }
 
 }  // namespace corpuscle

@@ -235,7 +235,6 @@ void FlowOutput::fill(Report& report) {
   Triple mean = simulation_.fluid().mean_velocity();
   for (double& component : mean) component /= units::mm_per_s;
   report.extra["superficial_velocity_mm_per_s"] = mean;
-  report.extra["pressure_setups"] = simulation_.fluid().pressure_setups();
   report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],
                            simulation_.grid().index().global[2]};
   report.steps = simulation_.steps();

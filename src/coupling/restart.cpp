@@ -80,8 +80,9 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
   vector("velocity", state.u);
   vector("velocity_old", state.u_old);
   file.add("pressure", cell_shape(index, 1), cell_slab(index, 1), box_values(index, owned, state.p).data());
-  file.add("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1),
-           box_integers(index, owned, state.kind_at_setup).data());
+  if (state.kind_at_setup.data())
+    file.add("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1),
+             box_integers(index, owned, state.kind_at_setup).data());
   for (int d = 0; d < 3; ++d) {
     const CellBox faces = face_range(index, d);
     file.add(flux_name(d), face_shape(index, d), face_slab(index, d), box_values(index, faces, state.flux[d]).data());
@@ -122,10 +123,12 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   std::vector<double> values(owned.size());
   file.read("pressure", cell_shape(index, 1), cell_slab(index, 1), values.data());
   set_box_values(index, owned, values, state.p);
-  std::vector<std::int64_t> kinds(owned.size());
-  file.read("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1), kinds.data());
-  Kokkos::deep_copy(state.kind_at_setup, simulation.grid().views().base_kind);
-  set_box_integers(index, owned, kinds, state.kind_at_setup);
+  if (state.kind_at_setup.data()) {
+    std::vector<std::int64_t> kinds(owned.size());
+    file.read("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1), kinds.data());
+    Kokkos::deep_copy(state.kind_at_setup, simulation.grid().views().base_kind);
+    set_box_integers(index, owned, kinds, state.kind_at_setup);
+  }
   for (int d = 0; d < 3; ++d) {
     // Each rank also reads the faces on its upper side, which another rank wrote.
     CellBox faces = owned;

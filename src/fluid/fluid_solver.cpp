@@ -17,6 +17,27 @@ namespace {
 
 Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
 
+/// Smallest eigenvalue of the symmetric tridiagonal matrix, by bisection on the number of negative pivots.
+double lowest_eigenvalue(const std::vector<double>& diagonal, const std::vector<double>& below) {
+  double low = 1e300, high = 1e300;
+  for (std::size_t n = 0; n < diagonal.size(); ++n) {
+    const double left = n > 0 ? below[n - 1] : 0, right = n + 1 < diagonal.size() ? below[n] : 0;
+    low = std::min(low, diagonal[n] - left - right);
+    high = std::min(high, diagonal[n]);
+  }
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = 0.5 * (low + high);
+    double pivot = 1;
+    bool negative = false;
+    for (std::size_t n = 0; n < diagonal.size() && !negative; ++n) {
+      pivot = diagonal[n] - middle - (n > 0 ? below[n - 1] * below[n - 1] / pivot : 0.0);
+      negative = pivot <= 0;
+    }
+    (negative ? high : low) = middle;
+  }
+  return low;
+}
+
 /// The lowest-numbered fluid cell of the whole grid, as a padded number on the rank that owns it and -1 elsewhere.
 int cell_to_pin(Grid& grid, const Array<NodeKind>& kind) {
   const int first = first_fluid_cell(grid.index(), kind);
@@ -34,11 +55,9 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
       boundaries_(grid, boundaries, shape),
       mu_(settings.density_pg_per_um3 * settings.kinematic_viscosity_um2_per_us),
       imposed_gradient_(1e-3 * to_vec3(settings.pressure_gradient_Pa_per_um)),
-      skewed_(!grid.orthogonal()),
-      krylov_(grid.comm(), 3 * grid.index().owned(), "corpuscle::fluid::krylov"),
-      pressure_solver_(grid, skewed_, settings.max_iterations) {
+      skewed_(!grid.orthogonal()) {
   const int n = grid.index().size(), owned = grid.index().owned();
-  for (auto* field : {&u_, &u_old_, &u_older_, &work_, &history_, &grad_p_})
+  for (auto* field : {&u_, &u_old_, &u_older_, &work_, &history_, &grad_p_, &rhs_})
     *field = Components<double>("corpuscle::fluid::velocity", n, 3);
   for (auto* field : {&p_, &p_old_, &psi_field_, &diagonal_}) *field = Array<double>("corpuscle::fluid::scalar", n);
   const bool convective = settings_.convection != FluidSettings::Convection::none;
@@ -52,39 +71,53 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     for (int e = 0; e < 3 && skewed_; ++e)
       if (e != d) g_.cross[d][e] = Array<double>("corpuscle::fluid::cross_coefficient", n);
   }
-  for (auto* v : {&residual_, &change_, &scratch_}) *v = Array<double>("corpuscle::fluid::vector", 3 * owned);
-  for (auto* v : {&negative_divergence_, &psi_}) *v = Array<double>("corpuscle::fluid::scalar_vector", owned);
+  if (settings_.convection == FluidSettings::Convection::implicit)
+    krylov_ = std::make_unique<KrylovVectors>(grid.comm(), 3 * owned);
+  negative_divergence_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
   kind_ = grid.views().base_kind;
-  kind_at_setup_ = Array<NodeKind>(uninitialised("corpuscle::fluid::kind_at_setup"), n);
-  Kokkos::deep_copy(kind_at_setup_, grid.views().base_kind);
   mask_ = PressureMask("corpuscle::fluid::pressure_mask", n);
   statistics_.reference_speed = boundaries_.largest_speed();
   if (skewed_)
     viscous_coefficients<true>(grid.views(), g_);
   else
     viscous_coefficients<false>(grid.views(), g_);
+  if (skewed_) {
+    kind_at_setup_ = Array<NodeKind>(uninitialised("corpuscle::fluid::kind_at_setup"), n);
+    Kokkos::deep_copy(kind_at_setup_, grid.views().base_kind);
+    psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
+    pressure_solver_ =
+        std::make_unique<PressureSolver>(grid.comm(), grid.index(), grid.halo(), true, settings.max_iterations);
+  } else {
+    multigrid_ = std::make_unique<PressureMultigrid>(grid, g_.normal, settings.max_iterations);
+  }
+  operator_ = {grid.views(), g_, Array<double>("corpuscle::fluid::momentum_inertia", n),
+               Array<double>("corpuscle::fluid::momentum_scale", n)};
   fill_matrix(kind_);
 }
 
 void FluidSolver::fill_matrix(const Array<NodeKind>& kind) {
   mark_pressure(kind, boundaries_.outflow(), mask_);
   if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind);
-  if (skewed_)
-    pressure_rows<true>(grid_->views(), g_.normal, kind, mask_, pressure_solver_.pattern(), pinned_,
-                        pressure_solver_.values());
-  else
-    pressure_rows<false>(grid_->views(), g_.normal, kind, mask_, pressure_solver_.pattern(), pinned_,
-                         pressure_solver_.values());
-  pressure_solver_.set_values();
+  if (multigrid_) return multigrid_->update(mask_, pinned_);
+  pressure_rows<true>(grid_->views(), g_.normal, kind, mask_, pressure_solver_->pattern(), pinned_,
+                      pressure_solver_->values());
+  pressure_solver_->set_values();
 }
 
 /// The preconditioner is set up, when it is due, before the first solve with the new matrix: both then belong to the
 /// same node kinds, which is all a restart has to remember.
 void FluidSolver::update_matrix() {
   fill_matrix(kind_);
-  if (!pressure_solver_.setup_is_due()) return;
-  pressure_solver_.set_up();
+  if (multigrid_ || !pressure_solver_->setup_is_due()) return;
+  pressure_solver_->set_up();
   Kokkos::deep_copy(kind_at_setup_, kind_);
+}
+
+KrylovResult FluidSolver::solve_pressure(double target) {
+  if (multigrid_) return multigrid_->solve(negative_divergence_, psi_field_, target);
+  const KrylovResult result = pressure_solver_->solve(negative_divergence_, psi_, target);
+  scalar_from_compact(grid_->index(), psi_, psi_field_);
+  return result;
 }
 
 void FluidSolver::set_kinds(const Array<NodeKind>& kind) {
@@ -128,6 +161,10 @@ void FluidSolver::begin_step(double dt) {
   mass1_ = rho * (second_order ? 2.0 : 1.0) / dt;
   mass2_ = rho * (second_order ? -0.5 : 0.0) / dt;
   momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
+  if (!krylov_ && mass_ != spectrum_.mass) {
+    bound_spectrum();
+    spectrum_.mass = mass_;
+  }
   // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
   if (second_order)
     extrapolate(u_old_, u_older_, u_);
@@ -174,18 +211,13 @@ void FluidSolver::assemble_history(double time) {
   }
 }
 
-void FluidSolver::apply_to_field(const Components<double>& u, const Array<double>& out) {
+/// out = D^-1 A u with implicit convection.
+void FluidSolver::apply_convective(const Components<double>& u, const Array<double>& out) {
   const double rho = settings_.density_pg_per_um3;
-  const bool implicit = settings_.convection == FluidSettings::Convection::implicit;
-  const auto& f = implicit ? flux_extrapolated_ : flux_;
-  if (skewed_ && implicit)
-    apply_momentum<true, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
-  else if (skewed_)
-    apply_momentum<true, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
-  else if (implicit)
-    apply_momentum<false, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  if (skewed_)
+    apply_momentum<true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, flux_extrapolated_, u, out);
   else
-    apply_momentum<false, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+    apply_momentum<false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, flux_extrapolated_, u, out);
 }
 
 template <class Vector>
@@ -197,45 +229,88 @@ void FluidSolver::apply(const EmbeddedBodies* bodies, const Vector& v, const Arr
     apply_homogeneous_rows(*bodies, work_);
     exchange_immersed(work_);
   }
-  apply_to_field(work_, out);
+  apply_convective(work_, out);
 }
 
+/// Right-hand side with the present pressure, and 2-norm of the momentum residual over that of the velocity.
 double FluidSolver::momentum_residual() {
   const auto scope = timers_->scope("momentum");
   grid_->halo().exchange(p_);
   pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_);
-  momentum_rhs(grid_->views(), kind_, diagonal_, history_, grad_p_, residual_);
-  apply_to_field(u_, scratch_);
-  KokkosBlas::axpy(-1.0, scratch_, residual_);
-  compact_from_field(grid_->index(), u_, scratch_);
-  double squares[2] = {KokkosBlas::nrm2_squared(residual_), KokkosBlas::nrm2_squared(scratch_)};
+  momentum_rhs(grid_->views(), kind_, diagonal_, history_, grad_p_, rhs_);
+  double squares[2];
+  if (krylov_) {
+    apply_convective(u_, krylov_->scratch);
+    compact_residual(grid_->index(), rhs_, krylov_->scratch, krylov_->residual);
+    squares[0] = KokkosBlas::nrm2_squared(krylov_->residual);
+  } else {
+    squares[0] = residual_square();
+  }
+  squares[1] = square_of(grid_->index(), u_);
   grid_->comm().sum(squares, 2);
   const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
+  residual_norm_ = std::sqrt(squares[0]);
   return std::sqrt(squares[0] / std::max(squares[1], floor));
+}
+
+double FluidSolver::residual_square() {
+  return skewed_ ? momentum_residual_square<true>(operator_, rhs_, u_)
+                 : momentum_residual_square<false>(operator_, rhs_, u_);
 }
 
 void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, int pass) {
   const auto scope = timers_->scope("momentum");
-  const double norm = std::sqrt(grid_->comm().sum(KokkosBlas::nrm2_squared(residual_)));
+  const double norm = residual_norm_;
   const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
   // Within the iterated projection a pass gains about a factor of 5: solving its momentum further is wasted.
   const double inner = iterated && pass > 0 ? 0.05 : 0.0;
   // Relative to the velocity; to the first residual in the first steps from rest, where there is no velocity yet.
   const double size = residual > 0 ? norm / residual : 0;
   const double target = std::max(settings_.momentum_tolerance * std::max(size, norm), inner * norm);
-  const auto result = krylov_.solve(
-      [&](const Array<double>& x, const Array<double>& y) { apply(bodies, x, y); }, residual_, change_,
-      target, settings_.max_iterations);
+  const auto result = krylov_ ? solve_convective(bodies, target) : iterate_momentum(bodies, norm, target);
   statistics_.momentum_iterations += result.iterations;
   if (!result.converged)
     throw ComputationError(fmt::format(
         "velocity: the momentum equation did not converge in {} iterations (residual {:.3g} of the velocity, wanted "
         "{:.3g}). Likely cause: a step too long for the flow or a diverging run; reduce time.step_us or raise "
         "fluid.max_iterations",
-        result.iterations, norm > 0 ? result.residual / norm * residual : result.residual,
-        settings_.momentum_tolerance));
-  add_vector(grid_->index(), change_, u_);
+        result.iterations, size > 0 ? result.residual / size : result.residual, settings_.momentum_tolerance));
+}
+
+KrylovResult FluidSolver::solve_convective(const EmbeddedBodies* bodies, double target) {
+  const auto result = krylov_->solver.solve(
+      [&](const Array<double>& x, const Array<double>& y) { apply(bodies, x, y); }, krylov_->residual, krylov_->change,
+      target, settings_.max_iterations);
+  add_vector(grid_->index(), krylov_->change, u_);
   complete_velocity(bodies);
+  return result;
+}
+
+/// Chebyshev iteration, in as many steps as theory says the reduction takes, and a few more at a time if it was not
+/// enough (immersed rows change the spectrum a little).
+KrylovResult FluidSolver::iterate_momentum(const EmbeddedBodies* bodies, double norm, double target) {
+  constexpr int more = 3;
+  KrylovResult result{0, norm, norm <= target};
+  ChebyshevSteps steps(spectrum_.lowest, spectrum_.highest);
+  const double centre = spectrum_.highest + spectrum_.lowest, radius = spectrum_.highest - spectrum_.lowest;
+  double predicted = std::ceil(std::acosh(std::max(norm / target, 1.0)) / std::acosh(centre / radius));
+  while (!result.converged && result.iterations < settings_.max_iterations && std::isfinite(result.residual)) {
+    const int batch = std::min(static_cast<int>(std::max(predicted, 1.0)), settings_.max_iterations - result.iterations);
+    for (int n = 0; n < batch; ++n) {
+      const auto step = steps.next();
+      if (skewed_)
+        momentum_step<true>(operator_, step.momentum, step.weight, rhs_, u_, work_);
+      else
+        momentum_step<false>(operator_, step.momentum, step.weight, rhs_, u_, work_);
+      std::swap(u_, work_);
+      complete_velocity(bodies);
+    }
+    result.iterations += batch;
+    result.residual = std::sqrt(grid_->comm().sum(residual_square()));
+    result.converged = result.residual <= target;
+    predicted = more;
+  }
+  return result;
 }
 
 void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
@@ -277,7 +352,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   const IndexSpace& index = grid_->index();
   const double cells = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   const double share = std::max(1.0, 0.1 * std::sqrt(cells));
-  if (pressure_solver_.setup_is_due()) update_matrix();
+  if (pressure_solver_ && pressure_solver_->setup_is_due()) update_matrix();
   // A round starts from the divergence that the corrected fluxes have, so its round-off is not that of the potential,
   // which an impulsive start makes large.
   constexpr int rounds = 4;
@@ -285,9 +360,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
     negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
     const double largest = grid_->comm().max(largest_magnitude(negative_divergence_));
     if (largest <= (round > 0 ? 1.5 * target : 0.0)) break;
-    const auto result =
-        round < rounds ? pressure_solver_.solve(negative_divergence_, psi_, round > 0 ? target : share * target)
-                       : KrylovResult{};
+    const auto result = round < rounds ? solve_pressure(round > 0 ? target : share * target) : KrylovResult{};
     statistics_.pressure_iterations += result.iterations;
     if (!result.converged)
       throw ComputationError(fmt::format(
@@ -295,7 +368,6 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
           "Likely cause: a pocket of fluid closed in by a body or prescribed velocities that do not conserve volume; "
           "check the boundaries, refine the grid, or raise fluid.max_iterations or fluid.divergence_tolerance",
           target, largest, statistics_.pressure_iterations));
-    scalar_from_compact(index, psi_, psi_field_);
     grid_->halo().exchange(psi_field_);
     if (skewed_)
       correct_flux<true>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
@@ -307,7 +379,44 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   complete_velocity(bodies);
 }
 
+/// Eigenvalues of the momentum operator without bodies (which only raise the lowest): from above by Gershgorin, from
+/// below by a few steps of the Lanczos process. On a skewed grid, where it is not quite symmetric, an estimate.
+void FluidSolver::bound_spectrum() {
+  constexpr int steps = 30;
+  constexpr double safety = 0.85;  // Ritz values approach the lowest eigenvalue from above
+  const Comm& comm = grid_->comm();
+  momentum_scales(grid_->index(), grid_->views().volume, grid_->views().base_kind, diagonal_, mass_, mu_, operator_);
+  spectrum_.highest =
+      comm.max(skewed_ ? largest_row_sum<true>(operator_) : largest_row_sum<false>(operator_));
+  Components<double> v = work_, w = rhs_;
+  std::vector<double> diagonal, below;
+  lanczos_start(operator_, v);
+  Kokkos::deep_copy(w, 0.0);
+  double beta = 0, size = std::sqrt(comm.sum(diagonal_dot(operator_, v, v)));
+  lanczos_combine(grid_->index(), 1 / size, 0, w, v);
+  for (int n = 0; n < steps; ++n) {
+    grid_->halo().exchange(v);
+    boundaries_.fill_homogeneous(v);
+    if (skewed_)
+      lanczos_operator<true>(operator_, beta, v, w);
+    else
+      lanczos_operator<false>(operator_, beta, v, w);
+    const double alpha = comm.sum(diagonal_dot(operator_, v, w));
+    lanczos_combine(grid_->index(), 1, alpha, v, w);
+    diagonal.push_back(alpha);
+    beta = std::sqrt(comm.sum(diagonal_dot(operator_, w, w)));
+    if (!(beta > 1e-10 * spectrum_.highest)) break;
+    below.push_back(beta);
+    lanczos_combine(grid_->index(), 1 / beta, 0, v, w);
+    std::swap(v, w);
+  }
+  const double lowest = safety * lowest_eigenvalue(diagonal, below);
+  // A positive floor keeps the iteration defined where skewness spoils the estimate.
+  spectrum_.lowest = std::max(lowest, 1e-4 * spectrum_.highest);
+}
+
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
+  momentum_scales(grid_->index(), grid_->views().volume, kind_, diagonal_, mass_, mu_, operator_);
   assemble_history(time);
   complete_velocity(bodies);
   const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
@@ -345,8 +454,10 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
 FluidSolver::State FluidSolver::state() const {
   State s{u_, u_old_, p_, {}, {}, kind_at_setup_, history_levels_, statistics_.reference_speed};
   for (int d = 0; d < 3; ++d) s.flux[d] = flux_[d], s.flux_old[d] = flux_old_[d];
-  s.iterations_after_setup = pressure_solver_.iterations_after_setup();
-  s.last_iterations = pressure_solver_.last_iterations();
+  if (pressure_solver_) {
+    s.iterations_after_setup = pressure_solver_->iterations_after_setup();
+    s.last_iterations = pressure_solver_->last_iterations();
+  }
   return s;
 }
 
@@ -387,12 +498,12 @@ void FluidSolver::restore(const State& state) {
   boundaries_.fill(u_old_);
   boundaries_.set_time(state.time_us);
   boundaries_.fill(u_);
-  if (!state.kind_at_setup.data()) return;
+  if (!pressure_solver_ || !state.kind_at_setup.data()) return;
   Kokkos::deep_copy(kind_at_setup_, state.kind_at_setup);
   grid_->halo().exchange(kind_at_setup_);
   fill_matrix(kind_at_setup_);
-  pressure_solver_.set_up();
-  pressure_solver_.resume(state.iterations_after_setup, state.last_iterations);
+  pressure_solver_->set_up();
+  pressure_solver_->resume(state.iterations_after_setup, state.last_iterations);
   fill_matrix(kind_);
 }
 

@@ -6,7 +6,7 @@
 #include "fluid/boundary_conditions.hpp"
 #include "fluid/embedded.hpp"
 #include "fluid/momentum.hpp"
-#include "fluid/pressure_solver.hpp"
+#include "fluid/pressure_multigrid.hpp"
 
 #include <functional>
 
@@ -51,7 +51,6 @@ class FluidSolver {
   }
   /// Imposed mean pressure gradient, kPa/um.
   const Vec3& imposed_gradient() const { return imposed_gradient_; }
-  double pressure_setups() const { return pressure_solver_.setups(); }
 
   /// Velocity [cell, 3] um/us and pressure [cell] kPa with valid halos; node kinds.
   const Components<double>& velocity() const { return u_; }
@@ -76,7 +75,7 @@ class FluidSolver {
     Components<double> u, u_old;
     Array<double> p;
     Array<double> flux[3], flux_old[3];   // flux_old only with convection
-    Array<NodeKind> kind_at_setup;        // node kinds when the pressure preconditioner was set up
+    Array<NodeKind> kind_at_setup;        // skewed grids: node kinds when the pressure preconditioner was set up
     int history_levels = 0;               // how many earlier velocities are valid
     double reference_speed = 0;
     double time_us = 0, step_us = 0;      // of u, and from u_old to u: boundary velocities are those of these times
@@ -96,10 +95,15 @@ class FluidSolver {
   double momentum_residual();
   void solve_momentum(const EmbeddedBodies* bodies, double residual, int pass);
   void project(const EmbeddedBodies* bodies);
+  KrylovResult solve_pressure(double target);
   void make_flux(const EmbeddedBodies* bodies);
   template <class Vector>
   void apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out);
-  void apply_to_field(const Components<double>& u, const Array<double>& out);
+  void apply_convective(const Components<double>& u, const Array<double>& out);
+  void bound_spectrum();
+  double residual_square();
+  KrylovResult solve_convective(const EmbeddedBodies* bodies, double target);
+  KrylovResult iterate_momentum(const EmbeddedBodies* bodies, double norm, double target);
   void exchange_immersed(const Components<double>& u);
   void complete_velocity(const EmbeddedBodies* bodies);
 
@@ -114,17 +118,33 @@ class FluidSolver {
   int history_levels_ = 0;
   int pinned_ = -1;
 
-  Components<double> u_, u_old_, u_older_, work_, history_, grad_p_;
+  Components<double> u_, u_old_, u_older_, work_, history_, grad_p_, rhs_;
   Array<double> p_, p_old_, psi_field_, diagonal_;
   Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
   Array<NodeKind> kind_, kind_at_setup_;
   PressureMask mask_;
   ViscousCoefficients g_;
-  Array<double> residual_, change_, scratch_;  // compact velocity vectors
-  Array<double> negative_divergence_, psi_;    // compact scalars
+  MomentumOperator operator_;
+  struct {
+    double lowest = 0, highest = 0;
+    double mass = -1;  // for which they hold
+  } spectrum_;
+  double residual_norm_ = 0;
+  Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)
   Table<double> body_sums_;
-  BiCGStab krylov_;
-  PressureSolver pressure_solver_;
+  /// Implicit convection makes the operator far from symmetric: BiCGStab on compact velocity vectors.
+  struct KrylovVectors {
+    KrylovVectors(const Comm& comm, int size)
+        : solver(comm, size, "corpuscle::fluid::krylov"),
+          residual("corpuscle::fluid::vector", size),
+          change("corpuscle::fluid::vector", size),
+          scratch("corpuscle::fluid::vector", size) {}
+    BiCGStab solver;
+    Array<double> residual, change, scratch;
+  };
+  std::unique_ptr<KrylovVectors> krylov_;
+  std::unique_ptr<PressureMultigrid> multigrid_;     // orthogonal grids
+  std::unique_ptr<PressureSolver> pressure_solver_;  // skewed ones
   Components<double> body_force_;
   std::function<void(double)> update_force_;
   FluidStatistics statistics_;

@@ -77,10 +77,9 @@ struct PressureSolver::Hypre {
   }
 };
 
-PressureSolver::PressureSolver(Grid& grid, bool skewed, int max_iterations)
-    : hypre_(std::make_unique<Hypre>()), comm_(grid.comm()), pattern_(RowPattern::make(skewed)) {
+PressureSolver::PressureSolver(const Comm& comm, const IndexSpace& index, Halo& halo, bool skewed, int max_iterations)
+    : hypre_(std::make_unique<Hypre>()), comm_(comm), pattern_(RowPattern::make(skewed)) {
   start_hypre_once();
-  const IndexSpace& index = grid.index();
   rows_ = index.owned();
   value_ = Table<double>("corpuscle::fluid::pressure_value", rows_, pattern_.count);
   slot_ = Table<int>(uninitialised("corpuscle::fluid::pressure_slot"), rows_, pattern_.count);
@@ -99,7 +98,7 @@ PressureSolver::PressureSolver(Grid& grid, bool skewed, int max_iterations)
   Array<int> number("corpuscle::fluid::row_number", index.size());
   Kokkos::deep_copy(number, -1);
   number_rows(index, first, number);
-  grid.halo().exchange(number);
+  halo.exchange(number);
   Table<int> column(uninitialised("corpuscle::fluid::pressure_column"), rows_, pattern_.count);
   pressure_columns(index, number, pattern_, column);
 
@@ -153,10 +152,26 @@ void PressureSolver::set_up() {
   hypre_->amg = make_boomer_amg();
   HYPRE_BoomerAMGSetup(hypre_->amg, hypre_->a, hypre_->b, hypre_->y);
   HYPRE_ParCSRFlexGMRESSetPrecond(hypre_->gmres, HYPRE_BoomerAMGSolve, keep_preconditioner, hypre_->amg);
-  // Once only: hypre allocates the Krylov vectors anew, and loses the old ones, at every call.
-  if (setups_ == 0) HYPRE_ParCSRFlexGMRESSetup(hypre_->gmres, hypre_->a, hypre_->b, hypre_->y);
   ++setups_;
   iterations_after_setup_ = -1;
+}
+
+void PressureSolver::load(const Array<double>& rhs, const Array<double>& x) {
+  Exec().fence();
+  HYPRE_IJVectorInitialize(hypre_->rhs);
+  HYPRE_IJVectorSetValues(hypre_->rhs, rows_, row_.data(), rhs.data());
+  HYPRE_IJVectorAssemble(hypre_->rhs);
+  HYPRE_IJVectorInitialize(hypre_->x);
+  HYPRE_IJVectorSetValues(hypre_->x, rows_, row_.data(), x.data());
+  HYPRE_IJVectorAssemble(hypre_->x);
+}
+
+void PressureSolver::cycle(const Array<double>& rhs, const Array<double>& x) {
+  Kokkos::deep_copy(x, 0.0);
+  load(rhs, x);
+  HYPRE_BoomerAMGSolve(hypre_->amg, hypre_->a, hypre_->b, hypre_->y);
+  HYPRE_ClearAllErrors();
+  HYPRE_IJVectorGetValues(hypre_->x, rows_, row_.data(), x.data());
 }
 
 KrylovResult PressureSolver::solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance) {
@@ -170,13 +185,10 @@ KrylovResult PressureSolver::solve(const Array<double>& rhs, const Array<double>
     result.converged = true;
     return result;
   }
-  Exec().fence();
-  HYPRE_IJVectorInitialize(hypre_->rhs);
-  HYPRE_IJVectorSetValues(hypre_->rhs, rows_, row_.data(), rhs.data());
-  HYPRE_IJVectorAssemble(hypre_->rhs);
-  HYPRE_IJVectorInitialize(hypre_->x);
-  HYPRE_IJVectorSetValues(hypre_->x, rows_, row_.data(), x.data());
-  HYPRE_IJVectorAssemble(hypre_->x);
+  // Once only: hypre allocates the Krylov vectors anew, and loses the old ones, at every call.
+  if (!krylov_ready_) HYPRE_ParCSRFlexGMRESSetup(hypre_->gmres, hypre_->a, hypre_->b, hypre_->y);
+  krylov_ready_ = true;
+  load(rhs, x);
   HYPRE_ParCSRFlexGMRESSetAbsoluteTol(hypre_->gmres, tolerance);
   HYPRE_ParCSRFlexGMRESSolve(hypre_->gmres, hypre_->a, hypre_->b, hypre_->y);
   HYPRE_ClearAllErrors();

@@ -1,9 +1,9 @@
-// The pressure equation: flexible GMRES on the true matrix, preconditioned by hypre's BoomerAMG.
+// A pressure equation given as matrix rows: flexible GMRES preconditioned by hypre's BoomerAMG, or one cycle of that.
 #pragma once
 
 #include "fluid/bicgstab.hpp"
 #include "fluid/pressure_matrix.hpp"
-#include "grid/grid.hpp"
+#include "parallel/halo.hpp"
 
 #include <memory>
 
@@ -13,7 +13,8 @@ namespace corpuscle {
 /// of the immersed nodes changes values only, and the preconditioner is set up again only when iterations have grown.
 class PressureSolver {
  public:
-  PressureSolver(Grid& grid, bool skewed, int max_iterations);
+  /// @param skewed  rows of 19 entries, not 7
+  PressureSolver(const Comm& comm, const IndexSpace& index, Halo& halo, bool skewed, int max_iterations);
   ~PressureSolver();
   PressureSolver(const PressureSolver&) = delete;
   PressureSolver& operator=(const PressureSolver&) = delete;
@@ -26,6 +27,8 @@ class PressureSolver {
   /// Solve for `x` from zero until the residual's 2-norm is below `absolute_tolerance`, or ten digits below that of
   /// `rhs`: then solve again for what is left. The `residual` returned is that of the start.
   KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
+  /// x = one BoomerAMG cycle from zero, a symmetric operator. @pre set_up()
+  void cycle(const Array<double>& rhs, const Array<double>& x);
 
   /// Whether there is no preconditioner yet, or iterations have grown since the last set-up.
   bool setup_is_due() const;
@@ -39,8 +42,9 @@ class PressureSolver {
   void resume(int iterations_after_setup, int last_iterations);
 
  private:
-
   struct Hypre;
+  void load(const Array<double>& rhs, const Array<double>& x);
+
   std::unique_ptr<Hypre> hypre_;
   Comm comm_;
   RowPattern pattern_;
@@ -48,6 +52,7 @@ class PressureSolver {
   Table<int> slot_;       // [row, entry] position in the packed arrays, -1 for no entry
   Array<double> packed_;  // coefficients as hypre takes them
   Array<int> row_, column_, row_length_;
+  bool krylov_ready_ = false;
   int rows_ = 0, setups_ = 0, iterations_after_setup_ = -1, last_iterations_ = 0;
 };
 

@@ -19,6 +19,7 @@ class Grid {
   const GridViews& views() const { return views_; }
   const Comm& comm() const { return comm_; }
   Halo& halo() { return halo_; }
+  const std::array<int, 3>& ranks_per_direction() const { return ranks_; }
 
   /// Node coordinates of the owned cells, [(n0 + 1) (n1 + 1) (n2 + 1), 3], i fastest; host memory, for output.
   const std::vector<double>& owned_nodes() const { return owned_nodes_; }

@@ -53,7 +53,7 @@ struct FluidSettings {
   int projection_max_iterations = 30;
   double momentum_tolerance = 1e-8;     // relative residual
   double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
-  int max_iterations = 200;             // of either linear solver
+  int max_iterations = 2000;            // of either linear solver
   Triple pressure_gradient_Pa_per_um{}; // imposed on periodic directions, in Pa/um; drives the flow along -gradient
 
   bool operator==(const FluidSettings&) const = default;

@@ -186,7 +186,7 @@ TEST_CASE("the pressure solver reaches the tolerance it is given", "[fluid][rank
   const NodeSource sheared{{8, 9, 12}, [](int i, int j, int k) { return Triple{i + 0.4 * j, 1.0 * j, 1.2 * k}; }};
   Grid grid(comm, skewed ? sheared : make_node_source(box({8, 9, 12}, {4, 4, 6})), periodic);
   REQUIRE(grid.orthogonal() == !skewed);
-  PressureSolver solver(grid, skewed, 200);
+  PressureSolver solver(grid.comm(), grid.index(), grid.halo(), skewed, 200);
   const IndexSpace index = grid.index();
   ViscousCoefficients g;
   for (int d = 0; d < 3; ++d) {

@@ -1,0 +1,49 @@
+// The pressure equation of an orthogonal grid, matrix-free: conjugate gradients preconditioned by a geometric multigrid
+// cycle, whose coarsest level is left to BoomerAMG.
+#pragma once
+
+#include "fluid/multigrid.hpp"
+#include "fluid/pressure_solver.hpp"
+#include "grid/grid.hpp"
+
+namespace corpuscle {
+
+/// Setting it up for other immersed nodes costs less than one iteration, so it is done whenever they change.
+/// On the tube of 31 x 31 x 51 nodes with a cell it needs 9 iterations for 7.8 digits, where BoomerAMG on the whole
+/// matrix needs 17 of twice the price.
+class PressureMultigrid {
+ public:
+  /// @param coefficient  [cell] of the normal pressure difference, by direction (ViscousCoefficients::normal)
+  PressureMultigrid(Grid& grid, const Array<double> (&coefficient)[3], int max_iterations);
+
+  /// Take over which nodes have a pressure. `pinned` as for pressure_rows.
+  void update(const PressureMask& mask, int pinned);
+
+  /// Solve for `x` [cell], from zero, until the residual's 2-norm is below `absolute_tolerance`, or ten digits below
+  /// that of `rhs` (compact): then solve again for what is left. The `residual` returned is that of the start.
+  KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
+
+  int levels() const { return static_cast<int>(levels_.size()); }
+
+ private:
+  struct Level {
+    MultigridLevel views;
+    Halo halo;
+    Array<double> b, x, y;
+  };
+  bool add_coarser();
+  void exchange(Level& level, const Array<double>& field);
+  void cycle(std::size_t number);
+  void solve_coarsest(Level& level);
+
+  Grid* grid_;
+  Array<double> coefficient_[3];
+  int max_iterations_;
+  bool exchanging_;
+  std::vector<Level> levels_;
+  std::unique_ptr<PressureSolver> coarsest_;
+  Array<double> coarse_rhs_, coarse_x_;
+  Array<double> p_, q_;
+};
+
+}  // namespace corpuscle
