@@ -51,7 +51,7 @@ struct FluidSettings {
   Projection projection = Projection::fractional_step;
   double projection_tolerance = 1e-6;   // iterated: velocity change of one pass over the velocity
   int projection_max_iterations = 30;
-  double momentum_tolerance = 1e-8;     // relative residual
+  double momentum_tolerance = 1e-6;     // relative residual; 1e-5 moves a cell by 1e-5 um in 400 us, 1e-6 by less
   double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
   int max_iterations = 2000;            // of either linear solver
   Triple pressure_gradient_Pa_per_um{}; // imposed on periodic directions, in Pa/um; drives the flow along -gradient
