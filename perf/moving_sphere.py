@@ -6,11 +6,12 @@
 The sphere (10 um) moves along the axis of a closed box of 16.12 um with an open end. The jitter is the rms deviation from a
 parabola in time, which takes out the smooth effect of the walls.
 """
-import csv, pathlib, subprocess, sys, tempfile
+import os, pathlib, sys, tempfile
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+import study
+
 SIDE, WARM_US, TRAVEL_US = 16.12, 20.0, 60.0
 CASE = """
 [time]
@@ -40,20 +41,32 @@ type = "outflow"
 SIDES = "".join(f'[[boundary]]\nside = "{s}"\ntype = "wall"\n' for s in ("i_min", "i_max", "j_min", "j_max", "k_min"))
 
 
-def run(nodes, step, folder):
+def speed_mm_per_s(nodes):
+    return 3 * SIDE / round(SIDE / 10 * nodes) / TRAVEL_US * 1e3
+
+
+def case(nodes, step):
     cells = round(SIDE / 10 * nodes)
-    spacing = SIDE / cells
-    case = folder / "moving.toml"
-    case.write_text(CASE.format(step=step, end=WARM_US + TRAVEL_US, n=cells + 1, low=-SIDE / 2,
-                                high=SIDE / 2, start=-1.5 * spacing, speed=3 * spacing / TRAVEL_US * 1e3) + SIDES)
-    subprocess.run([ROOT / "build/openmp/corpuscle", "run", case, "--out", folder / "out"], check=True,
-                   stdout=subprocess.DEVNULL)
-    rows = [r for r in csv.DictReader(open(folder / "out/history.csv")) if float(r["time_us"]) > WARM_US]
-    time = np.array([float(r["time_us"]) for r in rows])
+    return CASE.format(step=step, end=WARM_US + TRAVEL_US, n=cells + 1, low=-SIDE / 2, high=SIDE / 2,
+                       start=-1.5 * SIDE / cells, speed=speed_mm_per_s(nodes)) + SIDES
+
+
+def measure(outcome, column):
+    """Mean force, nN, and its rms jitter over the mean."""
+    rows = [row for row in outcome.history if row["time_us"] > WARM_US]
+    time = np.array([row["time_us"] for row in rows])
+    force = np.array([row[column] for row in rows])
+    smooth = np.polyval(np.polyfit(time - time.mean(), force, 2), time - time.mean())
+    return force.mean(), (force - smooth).std() / abs(force.mean())
+
+
+def run(nodes, step, folder):
+    outcome = study.run(case(nodes, step), folder=folder, threads=os.environ.get("OMP_NUM_THREADS", 1))
+    if not outcome.done:
+        sys.exit(f"moving_sphere.py: {outcome.message}")
     for column in ("force_z_nN", "balance_force_z_nN"):
-        force = np.array([float(r[column]) for r in rows])
-        smooth = np.polyval(np.polyfit(time - time.mean(), force, 2), time - time.mean())
-        print(f"{nodes},{step},{column},{force.mean():.3f},{(force - smooth).std() / abs(force.mean()):.5f}", flush=True)
+        mean, jitter = measure(outcome, column)
+        print(f"{nodes},{step},{column},{mean:.3f},{jitter:.5f}", flush=True)
 
 
 def main():

@@ -6,9 +6,10 @@
 F = 6 pi mu a U K with U the superficial velocity, by the momentum balance (the imposed mean pressure gradient times the
 whole volume) and by the tractions on the surface.
 """
-import csv, json, math, pathlib, subprocess, sys, tempfile
+import math, os, pathlib, sys, tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+import study
+
 EXACT = {0.027: 2.008, 0.064: 2.810, 0.125: 4.292, 0.216: 7.442}
 RADIUS, MU, GRADIENT = 5.0, 1.1, 1e-3  # um, mPa s, kPa/um
 
@@ -39,17 +40,27 @@ SIDES = "".join(f'[[boundary]]\nside = "{s}"\ntype = "periodic"\n'
                 for s in ("i_min", "i_max", "j_min", "j_max", "k_min", "k_max"))
 
 
-def run(fraction, nodes, folder):
-    side = RADIUS * (4 * math.pi / 3 / fraction) ** (1 / 3)
+def side_um(fraction):
+    return RADIUS * (4 * math.pi / 3 / fraction) ** (1 / 3)
+
+
+def case(fraction, nodes):
+    side = side_um(fraction)
     cells = round(side / (2 * RADIUS) * nodes)
-    case = folder / "array.toml"
-    case.write_text(CASE.format(n=cells + 1, low=-side / 2, high=side / 2, radius=RADIUS) + SIDES)
-    subprocess.run([ROOT / "build/openmp/corpuscle", "run", case, "--out", folder / "out"], check=True,
-                   stdout=subprocess.DEVNULL)
-    report = json.loads((folder / "out/report.json").read_text())
-    last = list(csv.DictReader(open(folder / "out/history.csv")))[-1]
-    stokes = 6 * math.pi * MU * RADIUS * report["superficial_velocity_mm_per_s"][2] * 1e-3
-    return GRADIENT * side ** 3 / stokes, float(last["force_z_nN"]) / stokes, report["wall_s"]
+    return CASE.format(n=cells + 1, low=-side / 2, high=side / 2, radius=RADIUS) + SIDES
+
+
+def drags(fraction, outcome):
+    """K by the momentum balance and by the tractions."""
+    stokes = 6 * math.pi * MU * RADIUS * outcome.report["superficial_velocity_mm_per_s"][2] * 1e-3
+    return GRADIENT * side_um(fraction) ** 3 / stokes, outcome.history[-1]["force_z_nN"] / stokes
+
+
+def run(fraction, nodes, folder):
+    outcome = study.run(case(fraction, nodes), folder=folder, threads=os.environ.get("OMP_NUM_THREADS", 1))
+    if not outcome.done:
+        sys.exit(f"sphere_array.py: {outcome.message}")
+    return *drags(fraction, outcome), outcome.report["wall_s"]
 
 
 def main():

@@ -141,9 +141,9 @@ KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, No
 }
 
 /// out = D^-1 A u on owned cells, compact order with component m at offset m * owned.
-///  fluid:    mass V u - mu (viscous fluxes) + rho (convective fluxes with the given face fluxes)
+///  fluid:    mass V u - mu (viscous fluxes) [+ rho (convective fluxes with the given face fluxes)]
 ///  others:   0 (immersed velocities are eliminated: u holds what their rows make of the fluid's)
-template <bool skewed, class Velocity>
+template <bool skewed, bool convective, class Velocity>
 void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
                     const Array<double>& diagonal, double mass, double mu, double rho, const Array<double> (&flux)[3],
                     const Velocity& u, const Array<double>& out) {
@@ -161,11 +161,13 @@ void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const A
     const Vec3 viscous = viscous_force<skewed>(g, u, index, c);
     for (int m = 0; m < 3; ++m) {
       double sum = inertia * u(c, m) - mu * viscous[m];
-      for (int d = 0; d < 3; ++d) {
-        const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
-        const int next = c + index.stride(d), low = c - index.stride(d);
-        sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
-                      convective_face(u, f(c), kind(low), kind(c), low, c, m));
+      if (convective) {  // not constexpr, as above
+        for (int d = 0; d < 3; ++d) {
+          const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
+          const int next = c + index.stride(d), low = c - index.stride(d);
+          sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
+                        convective_face(u, f(c), kind(low), kind(c), low, c, m));
+        }
       }
       out(e + m * owned) = sum * scale;
     }
@@ -230,15 +232,14 @@ inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, con
   });
 }
 
-/// What the momentum operator, without convection, needs at a cell: A u = D^-1 (mass V u - mu (viscous fluxes)).
+/// The momentum operator of an orthogonal grid without convection: A u = D^-1 (mass V u - mu (viscous fluxes)).
 struct MomentumOperator {
   GridViews grid;
   ViscousCoefficients g;
   Array<double> inertia, scale;  // mass V / D and mu / D at fluid nodes, zero elsewhere
 
-  template <bool skewed>
   KOKKOS_INLINE_FUNCTION Vec3 apply(const Components<double>& u, int c) const {
-    return inertia(c) * load(u, c) - scale(c) * viscous_force<skewed>(g, u, grid.index, c);
+    return inertia(c) * load(u, c) - scale(c) * viscous_force<false>(g, u, grid.index, c);
   }
 };
 
@@ -254,8 +255,7 @@ inline void momentum_scales(const IndexSpace& index, const Array<double>& volume
 }
 
 /// Upper bound of the operator's eigenvalues on this rank, by Gershgorin's circles.
-template <bool skewed>
-double largest_row_sum(const MomentumOperator& a) {
+inline double largest_row_sum(const MomentumOperator& a) {
   const IndexSpace index = a.grid.index;
   double largest = 0;
   Kokkos::parallel_reduce(
@@ -263,16 +263,7 @@ double largest_row_sum(const MomentumOperator& a) {
       KOKKOS_LAMBDA(int e, double& most) {
         const int c = index.cell(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]));
         double sum = 0;
-        if (skewed) {  // not constexpr, as above
-          const ViscousStencil s(a.g, index, c);
-          sum = -s.centre;
-          for (int d = 0; d < 3; ++d) {
-            for (int n = 0; n < 2; ++n) sum += s.axis[d][n] < 0 ? -s.axis[d][n] : s.axis[d][n];
-            for (int n = 0; n < 4; ++n) sum += s.edge[d][n] < 0 ? -s.edge[d][n] : s.edge[d][n];
-          }
-        } else {
-          for (int d = 0; d < 3; ++d) sum += 2 * (a.g.normal[d](c) + a.g.normal[d](c + index.stride(d)));
-        }
+        for (int d = 0; d < 3; ++d) sum += 2 * (a.g.normal[d](c) + a.g.normal[d](c + index.stride(d)));
         const double row = a.inertia(c) + a.scale(c) * sum;
         if (row > most) most = row;
       },
@@ -300,12 +291,11 @@ inline double diagonal_dot(const MomentumOperator& a, const Components<double>& 
 }
 
 /// w = A v - beta w on owned cells.
-template <bool skewed>
-void lanczos_operator(const MomentumOperator& a, double beta, const Components<double>& v, const Components<double>& w) {
+inline void lanczos_operator(const MomentumOperator& a, double beta, const Components<double>& v, const Components<double>& w) {
   const IndexSpace index = a.grid.index;
   for_owned("corpuscle::fluid::lanczos_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    store(w, c, a.apply<skewed>(v, c) - beta * load(w, c));
+    store(w, c, a.apply(v, c) - beta * load(w, c));
   });
 }
 
@@ -320,26 +310,24 @@ inline void lanczos_combine(const IndexSpace& index, double factor, double shift
 
 /// previous = u + momentum (u - previous) + weight (rhs - A u) at fluid nodes, u at others: the next Chebyshev iterate
 /// takes the place of the one before.
-template <bool skewed>
-void momentum_step(const MomentumOperator& a, double momentum, double weight, const Components<double>& rhs,
+inline void momentum_step(const MomentumOperator& a, double momentum, double weight, const Components<double>& rhs,
                    const Components<double>& u, const Components<double>& previous) {
   const IndexSpace index = a.grid.index;
   for_owned("corpuscle::fluid::momentum_step", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const bool fluid = a.scale(c) > 0;
     const Vec3 here = load(u, c);
-    const Vec3 next = here + momentum * (here - load(previous, c)) + weight * (load(rhs, c) - a.apply<skewed>(u, c));
+    const Vec3 next = here + momentum * (here - load(previous, c)) + weight * (load(rhs, c) - a.apply(u, c));
     store(previous, c, fluid ? next : here);
   });
 }
 
 /// This rank's sum of squares of rhs - A u over fluid nodes.
-template <bool skewed>
-double momentum_residual_square(const MomentumOperator& a, const Components<double>& rhs, const Components<double>& u) {
+inline double momentum_residual_square(const MomentumOperator& a, const Components<double>& rhs, const Components<double>& u) {
   const IndexSpace index = a.grid.index;
   return sum_owned("corpuscle::fluid::momentum_residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const Vec3 r = load(rhs, c) - a.apply<skewed>(u, c);
+    const Vec3 r = load(rhs, c) - a.apply(u, c);
     return a.scale(c) > 0 ? dot(r, r) : 0.0;
   });
 }
@@ -352,7 +340,7 @@ inline double square_of(const IndexSpace& index, const Components<double>& u) {
   });
 }
 
-/// Compact residual of the implicit convective operator: rhs - (what `applied` holds), component m at offset m * owned.
+/// residual (compact, component m at offset m * owned) = rhs - applied.
 inline void compact_residual(const IndexSpace& index, const Components<double>& rhs, const Array<double>& applied,
                              const Array<double>& residual) {
   const int owned = index.owned();

@@ -168,6 +168,79 @@ inline int absorb_isolated(const Lattice& lattice, const NodeBox& box, const Sur
   return isolated;
 }
 
+/// reached = 1 at the fluid nodes of the box's faces, 0 elsewhere in it.
+inline void seed_faces(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
+                       const Array<std::int8_t>& reached) {
+  const auto kind = nodes.kind;
+  Kokkos::parallel_for(
+      "corpuscle::immersed::seed_faces", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+        int i[3];
+        box.unpack(e, i);
+        bool face = false;
+        for (int d = 0; d < 3; ++d) face = face || i[d] == box.lower[d] || i[d] == box.upper[d];
+        const int c = index.cell(i[0], i[1], i[2]);
+        reached(c) = face && kind(c) == NodeKind::fluid ? 1 : 0;
+      });
+}
+
+/// Carry `reached` along the grid lines of a direction, both ways, through fluid nodes. @returns how many were new.
+inline int reach_along(const IndexSpace& index, const NodeBox& box, int direction, const NodeViews& nodes,
+                       const Array<std::int8_t>& reached) {
+  const int d1 = (direction + 1) % 3, d2 = (direction + 2) % 3;
+  const int lines1 = box.extent(d1), lines2 = box.extent(d2), length = box.extent(direction);
+  const int stride = index.stride(direction);
+  const auto kind = nodes.kind;
+  int added = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::reach_along", Policy(0, length > 0 ? lines1 * lines2 : 0),
+      KOKKOS_LAMBDA(int e, int& sum) {
+        int i[3];
+        i[direction] = box.lower[direction];
+        i[d1] = box.lower[d1] + e % lines1;
+        i[d2] = box.lower[d2] + e / lines1;
+        const int first = index.cell(i[0], i[1], i[2]);
+        for (int pass = 0; pass < 2; ++pass) {
+          bool carried = false;
+          for (int step = 0; step < length; ++step) {
+            const int c = first + stride * (pass == 0 ? step : length - 1 - step);
+            if (kind(c) != NodeKind::fluid) {
+              carried = false;
+            } else if (reached(c)) {
+              carried = true;
+            } else if (carried) {
+              reached(c) = 1;
+              sum += 1;
+            }
+          }
+        }
+      },
+      added);
+  return added;
+}
+
+/// Fluid nodes of the box that were not reached, in the band, become immersed. @returns how many of them are owned.
+inline int absorb_unreached(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
+                            const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
+  const auto triangle_body = surface.triangle_body;
+  const unsigned triangles = static_cast<unsigned>(surface.triangles);
+  const auto key = band.key;
+  const NodeViews out = nodes;
+  int absorbed = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::absorb_unreached", Policy(0, box.size()),
+      KOKKOS_LAMBDA(int e, int& sum) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        if (out.kind(c) != NodeKind::fluid || reached(c) || key(c) == no_key) return;
+        out.kind(c) = NodeKind::immersed;
+        out.body(c) = triangle_body(static_cast<int>(key_item(key(c)) % triangles));
+        if (index.owns(i[0], i[1], i[2])) sum += 1;
+      },
+      absorbed);
+  return absorbed;
+}
+
 /// Slots of the array filled by count_nodes().
 enum NodeCount { count_band, count_immersed, count_inside, count_undecided, count_cut, count_uncovered, count_slots };
 

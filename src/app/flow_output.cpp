@@ -73,6 +73,7 @@ void FlowOutput::gather() {
   flux_correction_ = std::max(flux_correction_, fluid.flux_correction);
   if (!simulation_.membranes()) return;
   coupling_.add(simulation_.statistics().coupling_iterations);
+  substeps_.add(simulation_.statistics().substeps);
   residual_.add(simulation_.statistics().coupling_residual);
 }
 
@@ -232,6 +233,7 @@ void FlowOutput::fill(Report& report) {
   report.momentum_iterations = momentum_;
   report.pressure_iterations = pressure_;
   report.coupling_iterations = coupling_;
+  report.membrane_substeps = substeps_;
   Triple mean = simulation_.fluid().mean_velocity();
   for (double& component : mean) component /= units::mm_per_s;
   report.extra["superficial_velocity_mm_per_s"] = mean;

@@ -49,7 +49,7 @@ class FlowOutput {
 #endif
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
-  Tally momentum_, pressure_, coupling_, residual_;
+  Tally momentum_, pressure_, coupling_, substeps_, residual_;
   double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
 };
 

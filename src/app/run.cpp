@@ -61,8 +61,12 @@ void run_flow(const Comm& comm, const Case& scene, const RunOptions& options, co
   FlowSimulation simulation(comm, scene, timers);
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
-    info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against 2 mu / h = {:.3g} pg/um2/us, a margin of {:.2f}",
+    info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
          s.mass_term, s.beta, s.threshold, s.margin());
+    const int substeps = simulation.membranes()->substeps(scene.time.step_us, s.beta);
+    if (substeps > 1)
+      info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
+           simulation.membranes()->stable_step_us());
   }
   std::optional<double> restart_us;
 #ifdef CORPUSCLE_HDF5
@@ -213,7 +217,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
        simulation.surfaces() ? simulation.surfaces()->vertices : 0);
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
-    info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, 2 mu / h = {:.3g} pg/um2/us)",
+    info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
          s.margin(), s.mass_term, s.beta, s.threshold);
     auto& membranes = *simulation.membranes();
     const double stable = membranes.stable_step_us();

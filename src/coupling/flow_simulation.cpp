@@ -20,6 +20,16 @@ std::array<bool, 3> periodic_directions(const std::vector<BoundarySettings>& bou
   return periodic;
 }
 
+/// An iterated coupling cannot see changes below what the fluid's own solver leaves. A residual of 1e-8 of the velocity,
+/// as 2-norms, left changes of 3e-4 in the interface's velocity on the tube: residuals are local, and the error is the
+/// residual over the operator's lowest eigenvalue (0.03 there).
+FluidSettings fluid_settings(const Case& scene) {
+  FluidSettings settings = *scene.fluid;
+  if (scene.coupling && !scene.cells.empty() && scene.coupling->scheme == CouplingSettings::Scheme::aitken)
+    settings.momentum_tolerance = std::min(settings.momentum_tolerance, 1e-6 * scene.coupling->tolerance);
+  return settings;
+}
+
 }  // namespace
 
 FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers) : scene_(scene), timers_(timers) {
@@ -29,7 +39,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
     throw InputError(fmt::format("time.end_us = {} is not a whole number of steps of {} us (time.step_us); use {}",
                                  scene.time.end_us, scene.time.step_us, total_steps_ * scene.time.step_us));
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
-  fluid_ = std::make_unique<FluidSolver>(*grid_, *scene.fluid, scene.boundaries, &*scene.grid, &timers_);
+  fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (scene.cells.empty() && scene.bodies.empty()) return;
   make_surfaces();
   immersed_ = std::make_unique<ImmersedFlow>(*fluid_, *surfaces_, timers_);
@@ -43,6 +53,11 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   v_answer_ = Components<double>("corpuscle::coupling::v_answer", vertices, 3);
   residual_ = Components<double>("corpuscle::coupling::residual", vertices, 3);
   previous_residual_ = Components<double>("corpuscle::coupling::previous_residual", vertices, 3);
+  constexpr int remembered = 10;
+  const bool iterated = scene.coupling->scheme == CouplingSettings::Scheme::aitken;
+  if (iterated) x_predicted_ = Components<double>("corpuscle::coupling::x_predicted", vertices, 3);
+  if (iterated && stability_.beta > 0)
+    anderson_ = std::make_unique<AndersonAcceleration>(vertices, remembered);
 }
 
 void FlowSimulation::make_surfaces() {
@@ -69,27 +84,56 @@ void FlowSimulation::check_start() {
 }
 
 /// A loosely coupled membrane is unstable where the fluid's reaction to its velocity, over one step, exceeds its inertia
-/// twice: M / (A dt) + beta < Lambda / 2. The reaction Lambda is largest for the shortest wave that the tractions
-/// resolve; with fits that are quadratic it is 4 mu / h. Measured by bisection on beta: 6.2 pg/um2/us for a spacing h
-/// of 0.333 um (box), 8.7 for 0.25 um (tube), both 1.9 to 2.0 mu / h.
+/// twice: M / (A dt) + beta < Lambda / 2. The reaction Lambda is viscous or inertial. Viscous, it is largest for the
+/// shortest wave that the tractions resolve: 4 mu / h with fits that are quadratic; measured by bisection on beta, 6.2
+/// pg/um2/us for a spacing h of 0.333 um (box) and 8.7 for 0.25 um (tube), both 1.9 to 2.0 mu / h. Inertial, it is 3/2
+/// rho c / dt with c the added mass over the cell's area: for a disk that moves along its axis 8/3 R^3 / A (Lamb,
+/// Hydrodynamics, section 102) in free fluid; measured in a tube of 10 um, by bisection on the mass at dt = 0.1 us, on the
+/// step and on the viscosity: twice that.
 void FlowSimulation::estimate_stability() {
+  constexpr double confined = 2.0, room = 2.0;
   const auto& coupling = *scene_.coupling;
-  const double h = immersed_->smallest_spacing_at_surfaces(), mu = fluid_->viscosity();
-  double mass_term = 1e300;
+  const double h = immersed_->smallest_spacing_at_surfaces(), mu = fluid_->viscosity(), dt = scene_.time.step_us;
+  double mass_term = 1e300, added = 0;
   const auto cells = membranes_->diagnostics();
-  for (int c = 0; c < membranes_->cells(); ++c)
-    mass_term = std::min(mass_term, scene_.cells[c].mass_pg / (cells[c].rest_area_um2 * scene_.time.step_us));
+  for (int c = 0; c < membranes_->cells(); ++c) {
+    const Triple extent = cells[c].extent_um();
+    const double radius = 0.5 * std::max({extent[0], extent[1], extent[2]});
+    mass_term = std::min(mass_term, scene_.cells[c].mass_pg / (cells[c].rest_area_um2 * dt));
+    added = std::max(added, confined * 8.0 / 3 * std::pow(radius, 3) / cells[c].rest_area_um2);
+  }
+  const double inertial = 0.75 * scene_.fluid->density_pg_per_um3 * added / dt;
   const bool robin = coupling.scheme == CouplingSettings::Scheme::robin ||
                      (coupling.scheme == CouplingSettings::Scheme::aitken && coupling.robin_in_aitken);
-  const double beta = coupling.robin_coefficient >= 0 ? coupling.robin_coefficient : mu * std::acos(-1.0) / h;
-  stability_ = {mass_term, robin ? beta : 0.0, 2 * mu / h};
+  const double beta = coupling.robin_coefficient >= 0 ? coupling.robin_coefficient
+                                                      : std::max(mu * std::acos(-1.0) / h, room * inertial);
+  stability_ = {mass_term, robin ? beta : 0.0, std::max(2 * mu / h, inertial)};
   if (coupling.scheme != CouplingSettings::Scheme::aitken && stability_.margin() < 1)
     throw InputError(fmt::format(
-        "coupling: M / (A dt) + beta = {:.3g} + {:.3g} pg/um2/us is below 2 mu / h = {:.3g}, half the fluid's reaction to "
-        "the shortest membrane wave the grid resolves, so this run would diverge. Use coupling.scheme = \"robin\" with "
-        "its default coefficient, or a cell of at least {:.3g} pg (cells.0.mass_pg), or coupling.scheme = \"aitken\"",
-        mass_term, stability_.beta, stability_.threshold,
+        "coupling: M / (A dt) + beta = {:.3g} + {:.3g} pg/um2/us is below {:.3g}, half the fluid's reaction (the larger of "
+        "2 mu / h = {:.3g}, to the shortest membrane wave the grid resolves, and 3/4 of the fluid carried along over the "
+        "step, {:.3g}), so this run would diverge. Use coupling.scheme = \"robin\" with its default coefficient, or a "
+        "cell of at least {:.3g} pg (cells.0.mass_pg), or coupling.scheme = \"aitken\"",
+        mass_term, stability_.beta, stability_.threshold, 2 * mu / h, inertial,
         (stability_.threshold - stability_.beta) / mass_term * scene_.cells[0].mass_pg));
+}
+
+/// An unstable staggered coupling swings to and fro: the velocity after a step has little to do with that before it, and
+/// grows. Ten such steps in a row are no start from rest.
+void FlowSimulation::watch_growth(double change, double speed_square) {
+  constexpr int most = 10;
+  constexpr double unrelated = 0.9;
+  if (!(change > unrelated)) {
+    swings_ = 0;
+    return;
+  }
+  if (swings_ == 0) swing_start_ = speed_square;
+  if (++swings_ < most || !(speed_square > 4 * swing_start_)) return;
+  throw ComputationError(fmt::format(
+      "coupling: the velocity of the membrane has swung to and fro for {} steps and grown {:.2g}-fold. Likely cause: the "
+      "fluid's reaction exceeds what the coupling anticipates; raise coupling.robin_coefficient_pg_per_um2_per_us (it is "
+      "{:.3g}) or cells.0.mass_pg, or use coupling.scheme = \"aitken\"",
+      swings_, std::sqrt(speed_square / swing_start_), stability_.beta));
 }
 
 void FlowSimulation::step() {
@@ -140,23 +184,30 @@ void FlowSimulation::step_staggered(double dt) {
   const auto norms = interface_residual(n, surfaces_->v, v_interface_, previous_residual_, residual_);
   statistics_.coupling_iterations = 1;
   statistics_.coupling_residual = norms.answer > 0 ? std::sqrt(norms.residual / norms.answer) : 0;
+  watch_growth(statistics_.coupling_residual, norms.answer);
 }
 
 /// Fixed point on the mean velocity of the interface over the step: fluid with that velocity, membrane with the
 /// tractions, compare. With the Robin term a pass multiplies the error of a mode on which the fluid reacts with Lambda
-/// by (beta - Lambda) / (M / (A dt) + beta), below one for every mode, so nothing is relaxed; without it the factor is
-/// -Lambda A dt / M and Aitken's relaxation (Kuettler and Wall, Comput. Mech. 43, 2008) makes it converge.
+/// by (beta - Lambda) / (M / (A dt) + beta), below one for every mode but close to it for the rigid ones, which Anderson
+/// acceleration takes out in a few passes; without it the factor is -Lambda A dt / M and Aitken's relaxation (Kuettler
+/// and Wall, Comput. Mech. 43, 2008) makes it converge.
 void FlowSimulation::step_iterated(double dt) {
   const auto& coupling = *scene_.coupling;
   const int n = membranes_->vertices();
   place_bodies(dt);
+  // Tractions are taken where nodes were classified, in every pass: which points a fit uses depends on the positions,
+  // and would let the iteration end in a cycle.
+  copy_vertices(n, surfaces_->x, x_predicted_);
   copy_vertices(n, x_start_, surfaces_->x);
   membranes_->save_state();
   copy_vertices(n, surfaces_->v, v_interface_);
-  relaxation_ = stability_.beta > 0 ? 1.0 : std::clamp(relaxation_, 0.01, 0.5);
+  relaxation_ = std::clamp(relaxation_, 0.01, 0.5);
+  if (anderson_) anderson_->start();
   double residual = 0;
   for (int k = 0; k < coupling.max_iterations; ++k) {
     copy_vertices(n, v_interface_, surfaces_->v);
+    copy_vertices(n, x_predicted_, surfaces_->x);
     immersed_->solve(time_ + dt);
     const auto& traction = immersed_->tractions();
     const auto scope = timers_.scope("membrane");
@@ -169,7 +220,11 @@ void FlowSimulation::step_iterated(double dt) {
     statistics_.coupling_residual = residual;
     if (!std::isfinite(residual)) break;
     if (residual <= coupling.tolerance) return;
-    if (stability_.beta == 0 && k > 0 && norms.change > 0)
+    if (anderson_) {
+      anderson_->advance(v_interface_, residual_);
+      continue;
+    }
+    if (k > 0 && norms.change > 0)
       relaxation_ = std::clamp(-relaxation_ * norms.product / norms.change, 0.005, 1.5);
     relax_interface(n, relaxation_, residual_, v_interface_, previous_residual_);
   }

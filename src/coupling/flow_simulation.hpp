@@ -1,6 +1,7 @@
 // A scene with fluid, advanced in time: the flow, the bodies in it, and the coupling between them.
 #pragma once
 
+#include "coupling/anderson.hpp"
 #include "coupling/immersed_flow.hpp"
 #include "coupling/rigid_bodies.hpp"
 #include "membrane/membranes.hpp"
@@ -13,7 +14,7 @@ namespace corpuscle {
 struct StabilityEstimate {
   double mass_term = 0;   // M / (A dt), pg/um2/us
   double beta = 0;        // Robin coefficient in use, pg/um2/us
-  double threshold = 0;   // half the largest reaction of the fluid, 2 mu / h
+  double threshold = 0;   // half the largest reaction of the fluid, viscous or inertial
   double margin() const { return (mass_term + beta) / threshold; }
 };
 
@@ -64,6 +65,7 @@ class FlowSimulation {
   void make_surfaces();
   void check_start();
   void estimate_stability();
+  void watch_growth(double change, double speed_square);
   void step_rigid(double dt);
   void step_staggered(double dt);
   void step_iterated(double dt);
@@ -77,9 +79,12 @@ class FlowSimulation {
   std::unique_ptr<SurfaceSet> surfaces_;
   std::unique_ptr<RigidBodies> rigid_bodies_;
   std::unique_ptr<ImmersedFlow> immersed_;
-  Components<double> x_start_, v_interface_, v_answer_, residual_, previous_residual_;
+  Components<double> x_start_, x_predicted_, v_interface_, v_answer_, residual_, previous_residual_;
+  std::unique_ptr<AndersonAcceleration> anderson_;
   StabilityEstimate stability_;
   StepStatistics statistics_;
+  int swings_ = 0;
+  double swing_start_ = 0;  // sum of the vertices' squared speeds when they began
   double time_ = 0, relaxation_ = 0.5;
   long steps_ = 0, total_steps_ = 0;
 };

@@ -71,7 +71,7 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     for (int e = 0; e < 3 && skewed_; ++e)
       if (e != d) g_.cross[d][e] = Array<double>("corpuscle::fluid::cross_coefficient", n);
   }
-  if (settings_.convection == FluidSettings::Convection::implicit)
+  if (skewed_ || settings_.convection == FluidSettings::Convection::implicit)
     krylov_ = std::make_unique<KrylovVectors>(grid.comm(), 3 * owned);
   negative_divergence_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
   kind_ = grid.views().base_kind;
@@ -90,7 +90,7 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
   } else {
     multigrid_ = std::make_unique<PressureMultigrid>(grid, g_.normal, settings.max_iterations);
   }
-  operator_ = {grid.views(), g_, Array<double>("corpuscle::fluid::momentum_inertia", n),
+  if (!krylov_) operator_ = {grid.views(), g_, Array<double>("corpuscle::fluid::momentum_inertia", n),
                Array<double>("corpuscle::fluid::momentum_scale", n)};
   fill_matrix(kind_);
 }
@@ -211,13 +211,17 @@ void FluidSolver::assemble_history(double time) {
   }
 }
 
-/// out = D^-1 A u with implicit convection.
-void FluidSolver::apply_convective(const Components<double>& u, const Array<double>& out) {
+/// out = D^-1 A u, compact.
+void FluidSolver::apply_to_field(const Components<double>& u, const Array<double>& out) {
   const double rho = settings_.density_pg_per_um3;
-  if (skewed_)
-    apply_momentum<true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, flux_extrapolated_, u, out);
+  const bool implicit = settings_.convection == FluidSettings::Convection::implicit;
+  const auto& f = implicit ? flux_extrapolated_ : flux_;
+  if (skewed_ && implicit)
+    apply_momentum<true, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+  else if (skewed_)
+    apply_momentum<true, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
   else
-    apply_momentum<false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, flux_extrapolated_, u, out);
+    apply_momentum<false, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
 }
 
 template <class Vector>
@@ -229,7 +233,7 @@ void FluidSolver::apply(const EmbeddedBodies* bodies, const Vector& v, const Arr
     apply_homogeneous_rows(*bodies, work_);
     exchange_immersed(work_);
   }
-  apply_convective(work_, out);
+  apply_to_field(work_, out);
 }
 
 /// Right-hand side with the present pressure, and 2-norm of the momentum residual over that of the velocity.
@@ -240,7 +244,7 @@ double FluidSolver::momentum_residual() {
   momentum_rhs(grid_->views(), kind_, diagonal_, history_, grad_p_, rhs_);
   double squares[2];
   if (krylov_) {
-    apply_convective(u_, krylov_->scratch);
+    apply_to_field(u_, krylov_->scratch);
     compact_residual(grid_->index(), rhs_, krylov_->scratch, krylov_->residual);
     squares[0] = KokkosBlas::nrm2_squared(krylov_->residual);
   } else {
@@ -254,8 +258,7 @@ double FluidSolver::momentum_residual() {
 }
 
 double FluidSolver::residual_square() {
-  return skewed_ ? momentum_residual_square<true>(operator_, rhs_, u_)
-                 : momentum_residual_square<false>(operator_, rhs_, u_);
+  return momentum_residual_square(operator_, rhs_, u_);
 }
 
 void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, int pass) {
@@ -267,7 +270,7 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, 
   // Relative to the velocity; to the first residual in the first steps from rest, where there is no velocity yet.
   const double size = residual > 0 ? norm / residual : 0;
   const double target = std::max(settings_.momentum_tolerance * std::max(size, norm), inner * norm);
-  const auto result = krylov_ ? solve_convective(bodies, target) : iterate_momentum(bodies, norm, target);
+  const auto result = krylov_ ? solve_krylov(bodies, target) : iterate_momentum(bodies, norm, target);
   statistics_.momentum_iterations += result.iterations;
   if (!result.converged)
     throw ComputationError(fmt::format(
@@ -277,7 +280,7 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, 
         result.iterations, size > 0 ? result.residual / size : result.residual, settings_.momentum_tolerance));
 }
 
-KrylovResult FluidSolver::solve_convective(const EmbeddedBodies* bodies, double target) {
+KrylovResult FluidSolver::solve_krylov(const EmbeddedBodies* bodies, double target) {
   const auto result = krylov_->solver.solve(
       [&](const Array<double>& x, const Array<double>& y) { apply(bodies, x, y); }, krylov_->residual, krylov_->change,
       target, settings_.max_iterations);
@@ -298,10 +301,7 @@ KrylovResult FluidSolver::iterate_momentum(const EmbeddedBodies* bodies, double 
     const int batch = std::min(static_cast<int>(std::max(predicted, 1.0)), settings_.max_iterations - result.iterations);
     for (int n = 0; n < batch; ++n) {
       const auto step = steps.next();
-      if (skewed_)
-        momentum_step<true>(operator_, step.momentum, step.weight, rhs_, u_, work_);
-      else
-        momentum_step<false>(operator_, step.momentum, step.weight, rhs_, u_, work_);
+      momentum_step(operator_, step.momentum, step.weight, rhs_, u_, work_);
       std::swap(u_, work_);
       complete_velocity(bodies);
     }
@@ -365,8 +365,9 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
     if (!result.converged)
       throw ComputationError(fmt::format(
           "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
-          "Likely cause: a pocket of fluid closed in by a body or prescribed velocities that do not conserve volume; "
-          "check the boundaries, refine the grid, or raise fluid.max_iterations or fluid.divergence_tolerance",
+          "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "
+          "coupling.robin_coefficient_pg_per_um2_per_us), or prescribed velocities that do not conserve volume; also "
+          "fluid.max_iterations and fluid.divergence_tolerance",
           target, largest, statistics_.pressure_iterations));
     grid_->halo().exchange(psi_field_);
     if (skewed_)
@@ -380,14 +381,13 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
 }
 
 /// Eigenvalues of the momentum operator without bodies (which only raise the lowest): from above by Gershgorin, from
-/// below by a few steps of the Lanczos process. On a skewed grid, where it is not quite symmetric, an estimate.
+/// below by a few steps of the Lanczos process.
 void FluidSolver::bound_spectrum() {
   constexpr int steps = 30;
   constexpr double safety = 0.85;  // Ritz values approach the lowest eigenvalue from above
   const Comm& comm = grid_->comm();
   momentum_scales(grid_->index(), grid_->views().volume, grid_->views().base_kind, diagonal_, mass_, mu_, operator_);
-  spectrum_.highest =
-      comm.max(skewed_ ? largest_row_sum<true>(operator_) : largest_row_sum<false>(operator_));
+  spectrum_.highest = comm.max(largest_row_sum(operator_));
   Components<double> v = work_, w = rhs_;
   std::vector<double> diagonal, below;
   lanczos_start(operator_, v);
@@ -397,10 +397,7 @@ void FluidSolver::bound_spectrum() {
   for (int n = 0; n < steps; ++n) {
     grid_->halo().exchange(v);
     boundaries_.fill_homogeneous(v);
-    if (skewed_)
-      lanczos_operator<true>(operator_, beta, v, w);
-    else
-      lanczos_operator<false>(operator_, beta, v, w);
+    lanczos_operator(operator_, beta, v, w);
     const double alpha = comm.sum(diagonal_dot(operator_, v, w));
     lanczos_combine(grid_->index(), 1, alpha, v, w);
     diagonal.push_back(alpha);
@@ -410,16 +407,17 @@ void FluidSolver::bound_spectrum() {
     lanczos_combine(grid_->index(), 1 / beta, 0, v, w);
     std::swap(v, w);
   }
-  const double lowest = safety * lowest_eigenvalue(diagonal, below);
-  // A positive floor keeps the iteration defined where skewness spoils the estimate.
-  spectrum_.lowest = std::max(lowest, 1e-4 * spectrum_.highest);
+  spectrum_.lowest = safety * lowest_eigenvalue(diagonal, below);
 }
 
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
-  momentum_scales(grid_->index(), grid_->views().volume, kind_, diagonal_, mass_, mu_, operator_);
+  if (!krylov_)
+    momentum_scales(grid_->index(), grid_->views().volume, kind_, diagonal_, mass_, mu_, operator_);
   assemble_history(time);
   complete_velocity(bodies);
   const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
+  // A fractional step's answer depends on the pressure it starts from: every solve of a step starts from the same.
+  if (!iterated && statistics_.passes > 0) Kokkos::deep_copy(Exec(), p_, p_old_);
   const int most = iterated ? settings_.projection_max_iterations : 1;
   for (int pass = 0; pass < most; ++pass) {
     const double residual = momentum_residual();

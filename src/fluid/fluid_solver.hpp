@@ -31,7 +31,7 @@ class FluidSolver {
   /// Start a step: the present solution becomes history.
   void begin_step(double dt_us);
   /// Solve for the velocity and pressure at `time_us`; may be called again within the same step with other surface
-  /// velocities, and then starts from the previous answer.
+  /// velocities: the answer depends on those alone, the previous one is a first guess.
   /// @throws ComputationError  when a linear solver does not converge or the velocity is not finite
   void solve(double time_us, const EmbeddedBodies* bodies);
   /// Undo begin_step: the state before the step is the present one again (its next solve may differ in the last bits).
@@ -99,10 +99,10 @@ class FluidSolver {
   void make_flux(const EmbeddedBodies* bodies);
   template <class Vector>
   void apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out);
-  void apply_convective(const Components<double>& u, const Array<double>& out);
+  void apply_to_field(const Components<double>& u, const Array<double>& out);
   void bound_spectrum();
   double residual_square();
-  KrylovResult solve_convective(const EmbeddedBodies* bodies, double target);
+  KrylovResult solve_krylov(const EmbeddedBodies* bodies, double target);
   KrylovResult iterate_momentum(const EmbeddedBodies* bodies, double norm, double target);
   void exchange_immersed(const Components<double>& u);
   void complete_velocity(const EmbeddedBodies* bodies);
@@ -132,7 +132,7 @@ class FluidSolver {
   double residual_norm_ = 0;
   Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)
   Table<double> body_sums_;
-  /// Implicit convection makes the operator far from symmetric: BiCGStab on compact velocity vectors.
+  /// Implicit convection and cross terms make the operator unsymmetric: BiCGStab on compact velocity vectors.
   struct KrylovVectors {
     KrylovVectors(const Comm& comm, int size)
         : solver(comm, size, "corpuscle::fluid::krylov"),

@@ -26,7 +26,7 @@ struct ImmersedOptions {
 struct ImmersedCounts {
   int fluid = 0, immersed = 0, inside = 0;
   int cut_links = 0;  // grid links that cross a surface
-  int isolated = 0;   // of the immersed: absorbed because no fluid neighbour was left
+  int isolated = 0;   // of the immersed: absorbed because closed in, alone or in pockets
   int uncovered = 0;  // inside at the last classification, fluid now
   int faces = 0;
   int owned_vertices = 0;
@@ -93,6 +93,7 @@ class ImmersedBoundary {
   StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
   NodeBox read_places();
   void classify_nodes(const NodeBox& box);
+  int absorb_pockets(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
   void read_counts(const NodeBox& box);
   void allocate_rows(int rows);
@@ -110,6 +111,7 @@ class ImmersedBoundary {
   BandViews band_;
   NodeViews nodes_;
   Array<NodeKind> previous_kind_;
+  Array<std::int8_t> reached_;
   Array<int> node_counts_, row_counts_, traction_counts_;
   StencilViews velocity_, pressure_;
   FootViews feet_;

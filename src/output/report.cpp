@@ -77,7 +77,8 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["peak_rss_mb_largest_rank"] = comm.max(peak_rss_mb());
   json["iterations"] = {{"momentum", to_json(report.momentum_iterations)},
                         {"pressure", to_json(report.pressure_iterations)},
-                        {"coupling", to_json(report.coupling_iterations)}};
+                        {"coupling", to_json(report.coupling_iterations)},
+                        {"membrane_substeps", to_json(report.membrane_substeps)}};
   json["errors"] = report.errors;
   for (const char* name :
        {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})

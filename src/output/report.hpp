@@ -30,7 +30,7 @@ struct Report {
   double simulated_us = 0;
   double wall_s = 0;
   std::map<std::string, double> wall_s_by_part;  // of this rank; all ranks have the same parts
-  Tally momentum_iterations, pressure_iterations, coupling_iterations;
+  Tally momentum_iterations, pressure_iterations, coupling_iterations, membrane_substeps;
   /// Error measures by name; those of the contract that a run does not have are written as null.
   nlohmann::json errors = nlohmann::json::object();
   /// Further entries of the top level.

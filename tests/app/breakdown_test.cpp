@@ -22,7 +22,7 @@ TEST_CASE("a cell carried out of the grid: the last good checkpoint is named, an
   // A flow a hundred times the case's carries the cell, 2.5 um from the end of the tube, into it within ten steps.
   const auto fast = [](const std::string& out, const std::string& end) {
     return coarse_tube(
-        out, {"cells.0.center_um=[0,0,20]", "boundary.0.velocity_mm_per_s=200", end, "output.checkpoint_every_us=3"});
+        out, {"cells.0.center_um=[0,0,20]", "boundary.0.velocity_mm_per_s=200", end, "output.checkpoint_every_us=4"});
   };
   const auto outcome =
       fail(folder, fast("out", "time.end_us=30"), 3,
@@ -34,7 +34,7 @@ TEST_CASE("a cell carried out of the grid: the last good checkpoint is named, an
     for (const auto& field : line) REQUIRE(std::isfinite(std::stod(field)));
 #ifdef CORPUSCLE_HDF5
   REQUIRE_THAT(outcome.output, Contains("Last good checkpoint: out/checkpoint.h5"));
-  const double last = h.number(h.lines.size() - 1, "time_us"), stored = 3 * std::floor(last / 3);
+  const double last = h.number(h.lines.size() - 1, "time_us"), stored = 4 * std::floor(last / 4);
   auto again = fast("again", "time.end_us=" + std::to_string(static_cast<int>(stored) + 1));
   again.insert(again.end(), {"--restart", "out/checkpoint.h5"});
   REQUIRE_THAT(succeed(folder, again).output,

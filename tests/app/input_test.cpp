@@ -111,7 +111,7 @@ TEST_CASE("surfaces that are open or inside out") {
   const auto whole = mesh_file(folder, "same.off", [](Words&) {});
   const auto open_mesh = mesh_file(folder, "open.off", open);
   const auto turned = mesh_file(folder, "turned.off", turn_inside_out);
-  const Words settings{"grid.nodes=[17,17,25]", "time.end_us=1"};
+  const Words settings{"grid.nodes=[17,17,25]", "time.step_us=1", "time.end_us=1"};
   const auto cell = [&](const std::string& file) {
     auto all = settings;
     all.push_back("cells.0.mesh=\"" + file + "\"");

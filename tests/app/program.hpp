@@ -100,7 +100,7 @@ inline Words with(Words words, const Words& overrides) {
 
 /// The straight tube with a cell on the coarsest grid that resolves it, 0.6 um: 0.05 s a step.
 inline Words coarse_tube(const std::string& out, const Words& overrides = {}) {
-  Words settings{"grid.nodes=[17,17,25]", "output.history_every_us=1"};
+  Words settings{"grid.nodes=[17,17,25]", "time.step_us=1", "output.history_every_us=1"};
   settings.insert(settings.end(), overrides.begin(), overrides.end());
   return with({"run", scene("straight_tube"), "--out", out}, settings);
 }

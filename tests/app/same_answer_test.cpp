@@ -54,7 +54,8 @@ void require_same_state(const fs::path& a, const fs::path& b, bool cell) {
 void require_same_after_restart(const fs::path& folder, const std::string& name, const Words& settings, bool cell) {
   const auto words = [&](const std::string& out, const std::string& end) {
     auto all = settings;
-    all.insert(all.end(), {"grid.nodes=[17,17,25]", "output.history_every_us=1", "output.checkpoint_every_us=6", end});
+    all.insert(all.end(), {"grid.nodes=[17,17,25]", "time.step_us=1", "output.history_every_us=1",
+                           "output.checkpoint_every_us=6", end});
     return with({"run", name, "--out", out}, all);
   };
   succeed(folder, words("whole", "time.end_us=12"));

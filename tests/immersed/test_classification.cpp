@@ -279,3 +279,38 @@ TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body
     }
   }
 }
+
+TEST_CASE("a pocket of fluid that bodies close in becomes immersed, and open fluid does not", "[immersed]") {
+  IndexSpace index;
+  for (int d = 0; d < 3; ++d) index.n[d] = index.global[d] = 9;
+  const int size = index.size();
+  const NodeViews nodes{Array<NodeKind>("corpuscle::test::kind", size), Array<int>("corpuscle::test::body", size)};
+  BandViews band;
+  band.key = Array<Key>("corpuscle::test::key", size);  // every node's closest triangle is the first one
+  SurfaceSet surface;
+  surface.triangles = 1;
+  surface.triangle_body = Array<int>("corpuscle::test::triangle_body", 1);
+  const Array<std::int8_t> reached("corpuscle::test::reached", size);
+  // A bent corridor of three nodes, walled in all around; a second one, open at its end.
+  const auto kind = nodes.kind;
+  for_owned(
+      "corpuscle::test::walls", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const bool inner = i > 0 && i < 8 && j > 0 && j < 8 && k > 1 && k < 7;
+        const bool closed = (k == 4 && j == 3 && (i == 3 || i == 4)) || (k == 4 && j == 4 && i == 4);
+        const bool open = j == 6 && k == 4 && i >= 3;
+        kind(index.cell(i, j, k)) = inner && !closed && !open ? NodeKind::immersed : NodeKind::fluid;
+      });
+  NodeBox box;
+  for (int d = 0; d < 3; ++d) box.lower[d] = 0, box.upper[d] = 8;
+  seed_faces(index, box, nodes, reached);
+  int added = 1;
+  while (added > 0) {
+    added = 0;
+    for (int d = 0; d < 3; ++d) added += reach_along(index, box, d, nodes, reached);
+  }
+  CHECK(absorb_unreached(index, box, surface, band, nodes, reached) == 3);
+  const auto found = on_host(nodes.kind);
+  CHECK(found(index.cell(3, 3, 4)) == NodeKind::immersed);
+  CHECK(found(index.cell(4, 4, 4)) == NodeKind::immersed);
+  CHECK(found(index.cell(3, 6, 4)) == NodeKind::fluid);
+}

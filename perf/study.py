@@ -1,0 +1,133 @@
+"""What the studies in this folder share: running the program, and writing what came out with where it was made."""
+import csv
+import dataclasses
+import datetime
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "perf" / "results"
+
+
+def program():
+    """The program to study: CORPUSCLE, or the one that setup.sh built."""
+    path = pathlib.Path(os.environ.get("CORPUSCLE", ROOT / "build/openmp/corpuscle"))
+    if not path.exists():
+        sys.exit(f"{path} does not exist: run ./setup.sh first, or set CORPUSCLE")
+    return path
+
+
+@dataclasses.dataclass
+class Run:
+    """Outcome of one run. `code` is the exit code, None if it was stopped for time; `report` is empty unless it is 0."""
+    code: int
+    wall_s: float
+    report: dict
+    history: list
+    message: str
+    folder: pathlib.Path
+
+    @property
+    def done(self):
+        return self.code == 0
+
+
+def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, options=()):
+    """Run `case` (a path, or the text of a case) with {"section.key": value} overrides in `folder`."""
+    folder = pathlib.Path(folder or tempfile.mkdtemp(prefix="corpuscle_"))
+    folder.mkdir(parents=True, exist_ok=True)
+    if "\n" in str(case):
+        path = folder / "case.toml"
+        path.write_text(case)
+    else:
+        path = ROOT / "cases" / case if (ROOT / "cases" / str(case)).exists() else pathlib.Path(case)
+    command = [str(program()), "run", str(path), "--out", str(folder), *options]
+    for key, value in (overrides or {}).items():
+        command += ["--set", f"{key}={toml(value)}"]
+    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), OMP_PROC_BIND="true" if ranks == 1 else "false")
+    if ranks > 1:
+        environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+        command = ["mpirun", "-n", str(ranks), "--oversubscribe"] + command
+    start = time.time()
+    try:
+        result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=timeout_s)
+        code, text = result.returncode, result.stdout + result.stderr
+    except subprocess.TimeoutExpired as stopped:
+        code, text = None, f"stopped after {timeout_s} s"
+    wall = time.time() - start
+    report, history = {}, []
+    if (folder / "report.json").exists():
+        report = json.loads((folder / "report.json").read_text())
+    if (folder / "history.csv").exists():
+        with open(folder / "history.csv") as file:
+            history = [{k: float(v) if v not in ("", None) else float("nan") for k, v in row.items()}
+                       for row in csv.DictReader(file)]
+    errors = [line for line in text.splitlines() if "error" in line and not line.startswith("errors:")]
+    return Run(code, wall, report, history, errors[-1] if errors and code != 0 else "", folder)
+
+
+def toml(value):
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(toml(v) for v in value) + "]"
+    return str(value)
+
+
+def provenance():
+    """Where and with what a study was made."""
+    def output(*command):
+        try:
+            return subprocess.run(command, capture_output=True, text=True, cwd=ROOT).stdout.strip()
+        except OSError:
+            return ""
+    model = ""
+    if pathlib.Path("/proc/cpuinfo").exists():
+        lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+        model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "")
+    dirty = "-dirty" if output("git", "status", "--porcelain", "--untracked-files=no") else ""
+    return {"date": datetime.date.today().isoformat(), "git": output("git", "rev-parse", "--short=12", "HEAD") + dirty,
+            "machine": f"{model or platform.processor()}, {os.cpu_count()} cores", "system": platform.system(),
+            "load_at_start": round(os.getloadavg()[0], 2)}
+
+
+def write_csv(path, rows):
+    """Rows are dictionaries; columns are the union of their keys, in order of appearance."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_json(path, rows, **more):
+    pathlib.Path(path).write_text(json.dumps({**provenance(), **more, "rows": rows}, indent=1) + "\n")
+
+
+def pareto(points):
+    """Indices of (cost, error) pairs that no other beats in both, cheapest first."""
+    front, best = [], float("inf")
+    for n in sorted(range(len(points)), key=lambda n: points[n]):
+        if points[n][1] < best:
+            front.append(n)
+            best = points[n][1]
+    return front
+
+
+def save_figure(figure, stem):
+    """Both kinds of picture: SVG for zooming, PNG for pages that do not show it."""
+    figure.savefig(f"{stem}.svg")
+    figure.savefig(f"{stem}.png", dpi=120)
+
+
+def markdown_table(rows, columns):
+    def cell(value):
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return "\n".join(lines + ["| " + " | ".join(cell(row.get(c, "")) for c in columns) + " |" for row in rows])
