@@ -16,7 +16,7 @@ RADIUS, MU, GRADIENT = 5.0, 1.1, 1e-3  # um, mPa s, kPa/um
 CASE = """
 [time]
 step_us = 10
-end_us = 300
+end_us = {end}
 [grid]
 generator = "box"
 nodes = [{n}, {n}, {n}]
@@ -47,7 +47,10 @@ def side_um(fraction):
 def case(fraction, nodes):
     side = side_um(fraction)
     cells = round(side / (2 * RADIUS) * nodes)
-    return CASE.format(n=cells + 1, low=-side / 2, high=side / 2, radius=RADIUS) + SIDES
+    # Twelve times the fluid's mass over the drag: what is left of the start is 1e-5.
+    relaxation = side ** 3 / (6 * math.pi * MU * RADIUS * EXACT[fraction])
+    end = 10 * max(30, math.ceil(1.2 * relaxation))
+    return CASE.format(end=end, n=cells + 1, low=-side / 2, high=side / 2, radius=RADIUS) + SIDES
 
 
 def drags(fraction, outcome):

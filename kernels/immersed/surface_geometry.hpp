@@ -24,7 +24,7 @@ inline void update_surface_geometry(const SurfaceSet& set) {
   const auto triangle = set.triangle;
   const auto ring_start = set.ring_start, ring_triangle = set.ring_triangle;
   Kokkos::parallel_for(
-      "corpuscle::immersed::surface_geometry", Policy(0, set.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::surface::surface_geometry", Policy(0, set.vertices), KOKKOS_LAMBDA(int i) {
         Vec3 sum;
         double ring_area = 0;
         for (int r = ring_start(i); r < ring_start(i + 1); ++r) {
@@ -48,7 +48,7 @@ void measure_surfaces(const SurfaceSet& set, const Array<double>& per_body) {
   const auto triangle = set.triangle;
   const auto first_triangle = set.first_triangle, first_vertex = set.first_vertex;
   Kokkos::parallel_for(
-      "corpuscle::immersed::measure_surfaces", Team(set.bodies, Kokkos::AUTO),
+      "corpuscle::surface::measure_surfaces", Team(set.bodies, Kokkos::AUTO),
       KOKKOS_LAMBDA(const typename Team::member_type& team) {
         const int body = team.league_rank();
         const Vec3 origin = load(x, first_vertex(body));

@@ -14,9 +14,9 @@ void allocate(SurfaceSet& set, const std::vector<TriangleMesh>& bodies) {
     set.vertices += int(mesh.vertices.size());
     set.triangles += int(mesh.triangles.size());
   }
-  const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::immersed::") + name); };
+  const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::surface::") + name); };
   set.x = Components<double>(label("x_vertex"), set.vertices, 3);
-  set.v = Components<double>("corpuscle::immersed::v_vertex", set.vertices, 3);
+  set.v = Components<double>("corpuscle::surface::v_vertex", set.vertices, 3);
   set.normal = Components<double>(label("normal_vertex"), set.vertices, 3);
   set.area = Array<double>(label("area_vertex"), set.vertices);
   set.triangle = Table<int>(label("triangle"), set.triangles, 3);

@@ -1,0 +1,156 @@
+// A module that a case does not ask for launches nothing and allocates nothing, no step allocates after the first ones,
+// and everything that is launched or allocated has a label.
+#include <catch2/catch.hpp>
+
+#include <cstdlib>
+#include <filesystem>
+#include <unistd.h>
+
+#include "app/flow_output.hpp"
+#include "app/modules.hpp"
+#include "core/log.hpp"
+#include "input/case.hpp"
+#include "membrane/stretching.hpp"
+#include "recorder.hpp"
+
+using namespace corpuscle;
+using needless::Recorder;
+
+namespace {
+
+/// Labels that belong to each module of list_modules(). A module without labels of its own is not listed: the iterated
+/// projection repeats the fractional step's kernels, and files are written by the host.
+const std::map<std::string, std::vector<std::string>> labels_of = {
+    {"fluid", {"corpuscle::fluid::", "corpuscle::multigrid::", "corpuscle::grid::"}},
+    {"convection", {"corpuscle::fluid::convection", "corpuscle::fluid::flux_old", "corpuscle::fluid::flux_extrapolated"}},
+    {"immersed search", {"corpuscle::immersed::"}},
+    {"rigid bodies", {"corpuscle::immersed::rigid_motion"}},
+    {"membrane", {"corpuscle::membrane::"}},
+    {"membrane viscosity",
+     {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
+    {"coupling", {"corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict"}},
+    {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
+    {"field output", {"corpuscle::output::gather"}},
+};
+
+struct Counts {
+  std::map<std::string, int> kernels, allocations;
+  int of(const std::string& prefix) const {
+    return Recorder::matching(kernels, prefix) + Recorder::matching(allocations, prefix);
+  }
+};
+
+void check_labels(const Counts& counts) {
+  const auto labelled = [](const std::string& label) {
+    // Kokkos and Kokkos Kernels name their own; an unnamed kernel is called by its type.
+    // "[unlabeled]" is memory that Kokkos takes for its own threads; a view without a label has an empty one.
+    for (const char* owner : {"corpuscle::", "Kokkos::", "KokkosBlas::", "[unlabeled]"})
+      if (label.rfind(owner, 0) == 0) return true;
+    return false;
+  };
+  for (const auto& [label, count] : counts.kernels) {
+    INFO("kernel \"" << label << "\", " << count << " times");
+    CHECK(labelled(label));
+    CHECK(label.find("lambda") == std::string::npos);
+  }
+  for (const auto& [label, count] : counts.allocations) {
+    INFO("view \"" << label << "\", " << count << " times");
+    CHECK(labelled(label));
+  }
+}
+
+void check_modules(const Case& scene, const Counts& counts) {
+  const auto modules = list_modules(scene, 1);
+  for (const auto& name : modules.left_out) {
+    if (!labels_of.count(name)) continue;
+    for (const auto& prefix : labels_of.at(name)) {
+      INFO(name << " is left out, but \"" << prefix << "\" was launched or allocated");
+      CHECK(counts.of(prefix) == 0);
+    }
+  }
+  for (const auto& name : modules.active) {
+    if (!labels_of.count(name)) continue;
+    INFO(name << " is active, but none of its labels was seen: is the list in this test out of date?");
+    int seen = 0;
+    for (const auto& prefix : labels_of.at(name)) seen += counts.of(prefix);
+    CHECK(seen > 0);
+  }
+}
+
+std::string case_file(const std::string& name) { return CORPUSCLE_SOURCE_DIR "/cases/" + name + ".toml"; }
+
+/// Set up and run a few steps with all output, then three more that must not allocate.
+void check_flow(const std::string& name, std::vector<std::string> overrides) {
+  overrides.insert(overrides.end(), {"time.step_us=1", "time.end_us=20", "output.every_us=2", "output.history_every_us=0",
+                                     "output.checkpoint_every_us=0"});
+  const Case scene = read_case(case_file(name), overrides);
+  const auto folder = std::filesystem::temp_directory_path() / ("corpuscle_needless_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  Recorder recorder;
+  recorder.start();
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  FlowOutput output(folder.string(), scene, simulation, timers, std::nullopt);
+  output.after_step(true);
+  for (int n = 0; n < 4; ++n) {
+    simulation.step();
+    output.after_step();
+  }
+  recorder.stop();
+  const Counts all{Recorder::kernels(), Recorder::allocations()};
+  recorder.start();
+  for (int n = 0; n < 3; ++n) simulation.step();
+  recorder.stop();
+  const Counts steps{Recorder::kernels(), Recorder::allocations()};
+  std::filesystem::remove_all(folder);
+
+  INFO(name);
+  check_labels(all);
+  check_modules(scene, all);
+  CHECK(Recorder::matching(steps.kernels, "corpuscle::") > 0);
+  for (const auto& [label, count] : steps.allocations) {
+    INFO("view \"" << label << "\" was allocated " << count << " times in three steps");
+    CHECK(count == 0);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothing new in a step", "[needless]") {
+  const std::string tube = "grid.nodes=[17,17,25]";
+  SECTION("tube flow") { check_flow("tube_flow", {tube}); }
+  SECTION("tube flow without convection and fields") {
+    check_flow("tube_flow", {tube, "fluid.convection=false", "output.fields=false"});
+  }
+  SECTION("tube flow on a skewed grid") { check_flow("tube_flow", {tube, "grid.cross_section=elliptical"}); }
+  SECTION("Couette flow") { check_flow("couette", {}); }
+  SECTION("uniform flow") { check_flow("uniform_flow", {"grid.nodes=[17,17,25]"}); }
+  SECTION("straight tube") { check_flow("straight_tube", {tube}); }
+  SECTION("straight tube, least of everything") {
+    check_flow("straight_tube", {tube, "fluid.convection=false", "cells.0.membrane_viscosity_N_s_per_m=0",
+                                 "output.fields=false", "output.cells=false"});
+  }
+  SECTION("straight tube, iterated coupling") {
+    check_flow("straight_tube", {tube, "coupling.scheme=aitken", "coupling.tolerance=0.01"});
+  }
+  SECTION("curved tube") { check_flow("curved_tube", {"grid.nodes=[17,17,31]"}); }
+}
+
+TEST_CASE("stretching has no grid, no search and no coupling", "[needless]") {
+  const Case scene = read_case(case_file("stretch"), {"stretching.steps=1"});
+  Recorder recorder;
+  recorder.start();
+  {
+    Membranes membranes(scene.cells);
+    stretch_cell(membranes, *scene.stretching);
+  }
+  recorder.stop();
+  const Counts counts{Recorder::kernels(), Recorder::allocations()};
+  check_labels(counts);
+  check_modules(scene, counts);
+  for (const char* prefix : {"corpuscle::fluid::", "corpuscle::multigrid::", "corpuscle::grid::", "corpuscle::halo::",
+                             "corpuscle::coupling::"}) {
+    INFO(prefix);
+    CHECK(counts.of(prefix) == 0);
+  }
+}
