@@ -70,6 +70,9 @@ class FluidSolver {
   /// Force on body `b` from the momentum balance over the faces around it: pressure and viscous stress, nN.
   std::vector<Triple> body_forces(const EmbeddedBodies& bodies);
 
+  /// Owned cells of the pressure solver's levels, finest first; empty on skewed grids.
+  std::vector<int> multigrid_cells() const { return multigrid_ ? multigrid_->cells() : std::vector<int>{}; }
+
   /// What a restart needs for the same bits as without the stop. Views share the solver's memory.
   struct State {
     Components<double> u, u_old;

@@ -88,6 +88,12 @@ bool PressureMultigrid::add_coarser() {
   return true;
 }
 
+std::vector<int> PressureMultigrid::cells() const {
+  std::vector<int> counts;
+  for (const auto& level : levels_) counts.push_back(level.views.index.owned());
+  return counts;
+}
+
 void PressureMultigrid::exchange(Level& level, const Array<double>& field) {
   if (exchanging_) level.halo.exchange(field);
 }

@@ -23,7 +23,8 @@ class PressureMultigrid {
   /// that of `rhs` (compact): then solve again for what is left. The `residual` returned is that of the start.
   KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
 
-  int levels() const { return static_cast<int>(levels_.size()); }
+  /// Owned cells of the levels, finest first.
+  std::vector<int> cells() const;
 
  private:
   struct Level {
