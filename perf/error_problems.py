@@ -278,7 +278,7 @@ class CellInTube(Problem):
     name, title = "g_cell_in_tube", "Cell in the straight tube"
     errors = {"outline_error_pc": "outline", "same_mesh_error_pc": "outline, same mesh", "speed_error_pc": "cell speed"}
     radius_um = 3.9
-    default = {"nodes": "31x31x51", "step_us": 1, "vertices": 500, "scheme": "robin", "coupling_tolerance": "unused by robin",
+    default = {"nodes": "31x31x51", "step_us": 2, "vertices": 500, "scheme": "robin", "coupling_tolerance": "unused by robin",
                "robin_coefficient": "pi mu / h", "convection": True, "projection": "fractional_step", **SOLVER, **CORES}
 
     def __init__(self, full):
@@ -305,7 +305,7 @@ class CellInTube(Problem):
 
     def combinations(self):
         cheap = {"momentum_tolerance": 1e-4, "divergence_tolerance": 1e-8}
-        return [{"step_us": 2, **cheap}, {"step_us": 4, **cheap}, {"nodes": "21x21x35", "step_us": 4},
+        return [{"step_us": 1, "vertices": 1000}, {**cheap}, {"step_us": 4, **cheap}, {"nodes": "21x21x35", "step_us": 4},
                 {"nodes": "26x26x43", "step_us": 2}, {"nodes": "41x41x67", "step_us": 4},
                 {"nodes": "31x31x51", "step_us": 2, "vertices": 1000}]
 

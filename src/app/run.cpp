@@ -52,6 +52,11 @@ void print_end(const Report& report, const std::string& folder) {
   for (const auto& [name, value] : report.errors.items())
     if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
   info("errors:{}", errors);
+  constexpr double lysis = 0.04;  // Evans, Waugh and Melnik, Biophys. J. 16, 1976: membranes break at 2 to 4 %
+  const auto drift = report.errors.find("area_drift");
+  if (drift != report.errors.end() && drift->is_number() && drift->get<double>() > lysis)
+    warn("a cell's area changed by {:.0f} %: a real membrane breaks at about 4 %, so this load is beyond the model",
+         100 * drift->get<double>());
   info("results in {}", folder);
 }
 

@@ -422,8 +422,9 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   for (int pass = 0; pass < most; ++pass) {
     const double residual = momentum_residual();
     if (!std::isfinite(residual))
-      throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run; reduce "
-                             "time.step_us");
+      throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run, with convection "
+                             "most often a step longer than the flow takes across a cell; reduce time.step_us, or set "
+                             "fluid.convection = \"implicit\"");
     statistics_.splitting = residual;
     if (pass > 0 && residual < settings_.projection_tolerance) break;
     solve_momentum(bodies, residual, pass);
