@@ -107,7 +107,7 @@ inline void correct_velocity(const GridViews& grid, const Array<NodeKind>& kind,
 /// share = 1 it is only just stable: beside bodies, where the velocity is reconstructed, the force on a sphere held in a
 /// flow oscillated with growing amplitude from nu dt / h^2 of about 20 on, and a cell in a grid of 0.1 um blew up. Shares
 /// below 2/3 are stable for any step in three dimensions (Guermond, Minev and Shen, Comput. Methods Appl. Mech. Eng.
-/// 195, 2006) and keep the order; the sphere's force is then steady to six digits. `negative` is -V div u* in
+/// 195, 2006) and keep the order; the sphere's force is then steady to five digits. `negative` is -V div u* in
 /// compact order.
 inline void update_pressure(const GridViews& grid, const Array<NodeKind>& kind, double mass, double mu,
                             const Array<double>& psi, const Array<double>& negative, const Array<double>& p) {

@@ -9,8 +9,8 @@
 namespace corpuscle {
 
 /// Setting it up for other immersed nodes costs less than one iteration, so it is done whenever they change.
-/// On the tube of 31 x 31 x 51 nodes with a cell it needs 9 iterations for 7.8 digits, where BoomerAMG on the whole
-/// matrix needs 17 of twice the price.
+/// On the tube of 31 x 31 x 51 nodes with a cell it needs 10 iterations a step, where BoomerAMG on the whole matrix
+/// needs 15 of more than twice the price.
 class PressureMultigrid {
  public:
   /// @param coefficient  [cell] of the normal pressure difference, by direction (ViscousCoefficients::normal)
