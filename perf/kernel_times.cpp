@@ -14,6 +14,7 @@
 
 #include "coupling/flow_simulation.hpp"
 #include "output/report.hpp"
+#include "program.hpp"
 
 using namespace corpuscle;
 
@@ -141,24 +142,7 @@ nlohmann::json study(const std::string& path, int steps, const std::vector<std::
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::fprintf(stderr, "usage: %s CASE.toml STEPS [section.key=value ...]\n", argv[0]);
-    return 2;
-  }
-#ifdef CORPUSCLE_MPI
-  MPI_Init(&argc, &argv);
-#endif
-  Kokkos::initialize(argc, argv);
-  int code = 0;
-  try {
-    std::printf("%s\n", study(argv[1], std::atoi(argv[2]), {argv + 3, argv + argc}).dump(1).c_str());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-    code = 3;
-  }
-  Kokkos::finalize();
-#ifdef CORPUSCLE_MPI
-  MPI_Finalize();
-#endif
-  return code;
+  return run_program(argc, argv, 2, "CASE.toml STEPS [section.key=value ...]", [](int count, char** words) {
+    std::printf("%s\n", study(words[1], std::atoi(words[2]), {words + 3, words + count}).dump(1).c_str());
+  });
 }

@@ -1,43 +1,33 @@
 // One run of the manufactured flow on the skewed cube, for perf/error_vs_time:
 //   manufactured_flow CELLS STEP_US STEPS fractional_step|iterated MOMENTUM_TOLERANCE
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
 #include "manufactured.hpp"
+#include "program.hpp"
 
 using namespace corpuscle;
 
+namespace {
+
+void solve(char** argv) {
+  FluidSettings settings;
+  const bool iterated = std::strcmp(argv[4], "iterated") == 0;
+  settings.projection = iterated ? FluidSettings::Projection::iterated : FluidSettings::Projection::fractional_step;
+  settings.projection_max_iterations = 100;
+  settings.momentum_tolerance = std::atof(argv[5]);
+  const auto start = std::chrono::steady_clock::now();
+  const auto errors = manufactured::run(Comm(), manufactured::skewed_cube(std::atoi(argv[1])), std::atof(argv[2]),
+                                        std::atoi(argv[3]), settings);
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::printf("{\"velocity_error\": %.6e, \"pressure_error\": %.6e, \"wall_s\": %.4f}\n", errors.velocity,
+              errors.pressure, wall);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  if (argc != 6) {
-    std::fprintf(stderr, "usage: %s CELLS STEP_US STEPS fractional_step|iterated MOMENTUM_TOLERANCE\n", argv[0]);
-    return 2;
-  }
-#ifdef CORPUSCLE_MPI
-  MPI_Init(&argc, &argv);
-#endif
-  Kokkos::initialize(argc, argv);
-  int code = 0;
-  try {
-    FluidSettings settings;
-    const bool iterated = std::strcmp(argv[4], "iterated") == 0;
-    settings.projection = iterated ? FluidSettings::Projection::iterated : FluidSettings::Projection::fractional_step;
-    settings.projection_max_iterations = 100;
-    settings.momentum_tolerance = std::atof(argv[5]);
-    const auto start = std::chrono::steady_clock::now();
-    const auto errors = manufactured::run(Comm(), manufactured::skewed_cube(std::atoi(argv[1])), std::atof(argv[2]),
-                                          std::atoi(argv[3]), settings);
-    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    std::printf("{\"velocity_error\": %.6e, \"pressure_error\": %.6e, \"wall_s\": %.4f}\n", errors.velocity,
-                errors.pressure, wall);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-    code = 3;
-  }
-  Kokkos::finalize();
-#ifdef CORPUSCLE_MPI
-  MPI_Finalize();
-#endif
-  return code;
+  return run_program(argc, argv, 5, "CELLS STEP_US STEPS fractional_step|iterated MOMENTUM_TOLERANCE",
+                     [](int, char** words) { solve(words); });
 }

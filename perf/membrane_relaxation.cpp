@@ -6,12 +6,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "core/units.hpp"
 #include "membrane/membranes.hpp"
-
-#ifdef CORPUSCLE_MPI
-#include <mpi.h>
-#endif
+#include "program.hpp"
 
 using namespace corpuscle;
 
@@ -28,7 +24,7 @@ void push(Membranes& membranes, double rate) {
       });
 }
 
-int relax(char** argv) {
+void relax(char** argv) {
   CellSettings cell;
   cell.vertices = std::atoi(argv[1]);
   cell.mass_pg = std::atof(argv[2]);
@@ -45,29 +41,11 @@ int relax(char** argv) {
   const auto extent = d.extent_um();
   std::printf("{\"extent_um\": [%.9g, %.9g, %.9g], \"elastic_energy_fJ\": %.9g, \"wall_s\": %.4f}\n", extent[0], extent[1],
               extent[2], d.energy_fJ(), wall);
-  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 6) {
-    std::fprintf(stderr, "usage: %s VERTICES MASS_PG MEMBRANE_VISCOSITY_N_S_PER_M MEMBRANE_STEP_US END_US\n", argv[0]);
-    return 2;
-  }
-#ifdef CORPUSCLE_MPI
-  MPI_Init(&argc, &argv);
-#endif
-  Kokkos::initialize(argc, argv);
-  int code = 3;
-  try {
-    code = relax(argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
-  }
-  Kokkos::finalize();
-#ifdef CORPUSCLE_MPI
-  MPI_Finalize();
-#endif
-  return code;
+  return run_program(argc, argv, 5, "VERTICES MASS_PG MEMBRANE_VISCOSITY_N_S_PER_M MEMBRANE_STEP_US END_US",
+                     [](int, char** words) { relax(words); });
 }

@@ -218,16 +218,23 @@ inline int reach_along(const IndexSpace& index, const NodeBox& box, int directio
   return added;
 }
 
-/// Fluid nodes of the box that were not reached, in the band, become immersed. @returns how many of them are owned.
-inline int absorb_unreached(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
+/// Fluid that a surface's folds close in, on the grid, has no pressure equation that could be solved: band nodes that no
+/// grid path joins to the faces of the box become immersed. @returns how many of them are owned.
+inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
                             const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
+  seed_faces(index, box, nodes, reached);
+  int added = 1;
+  while (added > 0) {
+    added = 0;
+    for (int d = 0; d < 3; ++d) added += reach_along(index, box, d, nodes, reached);
+  }
   const auto triangle_body = surface.triangle_body;
   const unsigned triangles = static_cast<unsigned>(surface.triangles);
   const auto key = band.key;
   const NodeViews out = nodes;
   int absorbed = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::immersed::absorb_unreached", Policy(0, box.size()),
+      "corpuscle::immersed::absorb_pockets", Policy(0, box.size()),
       KOKKOS_LAMBDA(int e, int& sum) {
         int i[3];
         box.unpack(e, i);

@@ -32,7 +32,6 @@ MultigridLevel make_level(const IndexSpace& index) {
 PressureMultigrid::PressureMultigrid(Grid& grid, const Array<double> (&coefficient)[3], int max_iterations)
     : grid_(&grid), max_iterations_(max_iterations) {
   const IndexSpace& index = grid.index();
-  exchanging_ = grid.comm().size() > 1 || index.periodic[0] || index.periodic[1] || index.periodic[2];
   for (int d = 0; d < 3; ++d) coefficient_[d] = coefficient[d];
   const auto vector = [](const IndexSpace& i) { return Array<double>("corpuscle::multigrid::vector", i.size()); };
   levels_.push_back({make_level(index), Halo(grid.comm(), index, grid.ranks_per_direction()), vector(index),
@@ -94,10 +93,6 @@ std::vector<int> PressureMultigrid::cells() const {
   return counts;
 }
 
-void PressureMultigrid::exchange(Level& level, const Array<double>& field) {
-  if (exchanging_) level.halo.exchange(field);
-}
-
 void PressureMultigrid::update(const PressureMask& mask, int pinned) {
   mask_conductances(coefficient_, mask, levels_[0].views);
   double extra = 0;
@@ -109,7 +104,7 @@ void PressureMultigrid::update(const PressureMask& mask, int pinned) {
       Kokkos::deep_copy(extra, Kokkos::subview(views.diagonal, pinned));
     }
     level_diagonals(views, pinned, extra);
-    exchange(levels_[l], views.inverse);
+    levels_[l].halo.exchange(views.inverse);
     if (pinned >= 0 && l + 1 < levels_.size()) {
       int at[3];
       views.index.unpack(pinned, at[0], at[1], at[2]);
@@ -133,23 +128,23 @@ void PressureMultigrid::cycle(std::size_t number) {
   Level& level = levels_[number];
   if (number + 1 == levels_.size()) return solve_coarsest(level);
   const MultigridLevel& views = level.views;
-  exchange(level, level.b);
+  level.halo.exchange(level.b);
   ChebyshevSteps before(smoothed_from, smoothed_to);
   const auto first = before.next(), second = before.next();
   smooth_from_zero(views, first, second, level.b, level.y, level.x);
   for (int n = 2; n < smoothing_steps; ++n) {
-    exchange(level, level.x);
+    level.halo.exchange(level.x);
     smooth(views, before.next(), level.b, level.x, level.y);
     std::swap(level.x, level.y);
   }
-  exchange(level, level.x);
+  level.halo.exchange(level.x);
   Level& coarse = levels_[number + 1];
   restrict_residual(views, coarse.views.index, level.b, level.x, coarse.b);
   cycle(number + 1);
   add_correction(views, coarse.views.index, coarse.x, level.x);
   ChebyshevSteps after(smoothed_from, smoothed_to);
   for (int n = 0; n < smoothing_steps; ++n) {
-    exchange(level, level.x);
+    level.halo.exchange(level.x);
     smooth(views, after.next(), level.b, level.x, level.y);
     std::swap(level.x, level.y);
   }
@@ -173,7 +168,7 @@ KrylovResult PressureMultigrid::solve(const Array<double>& rhs, const Array<doub
     const double next = comm.sum(owned_dot(index, r, finest.x));
     new_direction(index, result.iterations == 0 ? 0.0 : next / rz, finest.x, p_);
     rz = next;
-    exchange(finest, p_);
+    finest.halo.exchange(p_);
     const double alpha = rz / comm.sum(apply_and_dot(finest.views, p_, q_));
     norm = std::sqrt(comm.sum(advance_and_norm(index, alpha, p_, q_, x, r)));
     ++result.iterations;

@@ -33,14 +33,12 @@ class PressureMultigrid {
     Array<double> b, x, y;
   };
   bool add_coarser();
-  void exchange(Level& level, const Array<double>& field);
   void cycle(std::size_t number);
   void solve_coarsest(Level& level);
 
   Grid* grid_;
   Array<double> coefficient_[3];
   int max_iterations_;
-  bool exchanging_;
   std::vector<Level> levels_;
   std::unique_ptr<PressureSolver> coarsest_;
   Array<double> coarse_rhs_, coarse_x_;

@@ -194,21 +194,9 @@ void ImmersedBoundary::classify_nodes(const NodeBox& box) {
   for (int d = 0; d < 3; ++d) fill_lines(grid_.index, interior, d, nodes_);
   mark_immersed(lattice_, box, surface_, band_, nodes_);
   counts_.isolated = absorb_isolated(lattice_, box, surface_, images_, normals_, band_, nodes_);
-  counts_.isolated += absorb_pockets(box);
+  counts_.isolated += absorb_pockets(grid_.index, box, surface_, band_, nodes_, reached_);
   count_nodes(grid_.index, box, band_, nodes_, previous_kind_, node_counts_);
   read_counts(box);
-}
-
-/// Fluid that a surface's folds close in, on the grid, has no pressure equation that could be solved: nodes that no grid
-/// path joins to the faces of the box become immersed.
-int ImmersedBoundary::absorb_pockets(const NodeBox& box) {
-  seed_faces(grid_.index, box, nodes_, reached_);
-  int added = 1;
-  while (added > 0) {
-    added = 0;
-    for (int d = 0; d < 3; ++d) added += reach_along(grid_.index, box, d, nodes_, reached_);
-  }
-  return absorb_unreached(grid_.index, box, surface_, band_, nodes_, reached_);
 }
 
 void ImmersedBoundary::read_counts(const NodeBox& box) {

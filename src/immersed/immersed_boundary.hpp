@@ -93,7 +93,6 @@ class ImmersedBoundary {
   StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
   NodeBox read_places();
   void classify_nodes(const NodeBox& box);
-  int absorb_pockets(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
   void read_counts(const NodeBox& box);
   void allocate_rows(int rows);

@@ -45,8 +45,8 @@ void require_sound(const Case& scene) {
   // Between rest and the speed on the axis, twice the mean; a coupling that swings leaves that at once.
   CHECK(sound.speed > 0);
   CHECK(sound.speed < 2.2 * scene.boundaries[4].speed);
-  CHECK(sound.volume_drift < 1e-4);
-  CHECK(sound.area_drift < 0.02);
+  CHECK(sound.volume_drift < 1e-4);  // the bound asked of every run
+  CHECK(sound.area_drift < 0.02);    // the whole tube's is 0.012
 }
 
 }  // namespace
@@ -134,12 +134,11 @@ TEST_CASE("a body held in a flow of large nu dt / h^2 feels a steady force", "[c
   while (!simulation.done()) {
     simulation.step();
     speed.push_back(simulation.fluid().mean_velocity()[2]);
-    const auto& traction = simulation.immersed()->tractions();
-    (void)traction;
-    const auto force = simulation.immersed()->loads({{0.013, 0.021, 0.017}})[0][0];
+    simulation.immersed()->tractions();
+    const auto force = simulation.immersed()->loads({scene.bodies[0].center_um})[0][0];
     if (speed.size() > 50) {
       INFO("step " << speed.size());
-      CHECK(force[2] == Approx(1e-3 * std::pow(16.12, 3)).epsilon(0.08));  // the imposed gradient times the volume
+      CHECK(force[2] == Approx(1e-3 * std::pow(16.12, 3)).epsilon(0.08));  // the imposed gradient times the volume; tractions are 5 % low at 16 nodes a diameter
     }
   }
   for (std::size_t n = speed.size() - 10; n + 1 < speed.size(); ++n)
