@@ -1,4 +1,4 @@
-// Normals, areas and volumes of the immersed surfaces, from the positions of their vertices.
+// Normals and areas of the immersed surfaces, from the positions of their vertices.
 #pragma once
 
 #include "common/types.hpp"
@@ -36,42 +36,6 @@ inline void update_surface_geometry(const SurfaceSet& set) {
         store(normal, i, length > 0 ? sum * (1 / length) : sum);
         area(i) = ring_area / 3;
       });
-}
-
-/// What a sum over the triangles of one body adds up.
-enum class SurfaceMeasure { area, volume };
-
-template <SurfaceMeasure measure>
-void measure_surfaces(const SurfaceSet& set, const Array<double>& per_body) {
-  using Team = Kokkos::TeamPolicy<Exec>;
-  const auto x = set.x;
-  const auto triangle = set.triangle;
-  const auto first_triangle = set.first_triangle, first_vertex = set.first_vertex;
-  Kokkos::parallel_for(
-      "corpuscle::surface::measure_surfaces", Team(set.bodies, Kokkos::AUTO),
-      KOKKOS_LAMBDA(const typename Team::member_type& team) {
-        const int body = team.league_rank();
-        const Vec3 origin = load(x, first_vertex(body));
-        double total = 0;
-        Kokkos::parallel_reduce(
-            Kokkos::TeamThreadRange(team, first_triangle(body), first_triangle(body + 1)),
-            [&](int t, double& sum) {
-              const Vec3 a = area_vector(triangle, x, t);
-              sum += measure == SurfaceMeasure::area ? norm(a) : dot(load(x, triangle(t, 0)) - origin, a) / 3;
-            },
-            total);
-        Kokkos::single(Kokkos::PerTeam(team), [&]() { per_body(body) = total; });
-      });
-}
-
-/// Volume of each body, um3. @param per_body  [bodies]
-inline void surface_volume(const SurfaceSet& set, const Array<double>& per_body) {
-  measure_surfaces<SurfaceMeasure::volume>(set, per_body);
-}
-
-/// Area of each body, um2. @param per_body  [bodies]
-inline void surface_area(const SurfaceSet& set, const Array<double>& per_body) {
-  measure_surfaces<SurfaceMeasure::area>(set, per_body);
 }
 
 }  // namespace corpuscle

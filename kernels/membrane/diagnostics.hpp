@@ -116,4 +116,17 @@ inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
       });
 }
 
+/// Kinetic energy of all membranes, fJ.
+inline double kinetic_energy(const MembraneViews& m) {
+  const auto v = m.surface.v;
+  double energy = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::kinetic_energy", Policy(0, m.vertices),
+      KOKKOS_LAMBDA(int i, double& sum) {
+        sum += 0.5 * m.law(m.type(m.surface.vertex_body(i))).vertex_mass * dot(load(v, i), load(v, i));
+      },
+      energy);
+  return energy;
+}
+
 }  // namespace corpuscle

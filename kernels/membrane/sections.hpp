@@ -4,28 +4,11 @@
 
 #include <string>
 
-#include "common/types.hpp"
+#include "common/sums.hpp"
 
 namespace corpuscle {
 
 inline constexpr int sections = 16;  // enough parallel work for one small cell, few enough to add again where needed
-
-/// Several sums at once.
-template <int n>
-struct Sums {
-  double value[n] = {};
-
-  KOKKOS_INLINE_FUNCTION double& operator[](int i) { return value[i]; }
-  KOKKOS_INLINE_FUNCTION double operator[](int i) const { return value[i]; }
-  KOKKOS_INLINE_FUNCTION Sums& operator+=(const Sums& b) {
-    for (int i = 0; i < n; ++i) value[i] += b.value[i];
-    return *this;
-  }
-  // Kokkos 3 joins partial results through volatile references.
-  KOKKOS_INLINE_FUNCTION void operator+=(const volatile Sums& b) volatile {
-    for (int i = 0; i < n; ++i) value[i] = value[i] + b.value[i];
-  }
-};
 
 using SectionTeam = typename Kokkos::TeamPolicy<Exec>::member_type;
 
@@ -58,8 +41,3 @@ KOKKOS_INLINE_FUNCTION double section_total(const Table<double>& sums, int cell,
 }
 
 }  // namespace corpuscle
-
-template <int n>
-struct Kokkos::reduction_identity<corpuscle::Sums<n>> {
-  KOKKOS_FORCEINLINE_FUNCTION static corpuscle::Sums<n> sum() { return {}; }
-};

@@ -219,4 +219,24 @@ void dissipative_force(const MembraneViews& m, const Components<double>& v, cons
       });
 }
 
+/// v . D v over all membranes, nW.
+template <class Damping>
+double viscous_power(const MembraneViews& m) {
+  const auto x = m.surface.x, v = m.surface.v;
+  double power = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::viscous_power", Policy(0, m.vertices),
+      KOKKOS_LAMBDA(int i, double& sum) {
+        const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
+        for (int r = m.surface.ring_start(i); r < m.surface.ring_start(i + 1); ++r) {
+          const int j = ring_vertex(m.surface, r);
+          Vec3 along = load(x, j) - load(x, i);
+          along *= 1 / norm(along);
+          sum += dot(load(v, i), Damping::force(law, load(v, i) - load(v, j), along));
+        }
+      },
+      power);
+  return power;
+}
+
 }  // namespace corpuscle

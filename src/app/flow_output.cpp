@@ -29,7 +29,8 @@ std::vector<std::int32_t> to_int32(const Table<int>& table) {
 
 FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
                        std::optional<double> restart_us)
-    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us) {
+    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us),
+      energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
@@ -81,7 +82,10 @@ void FlowOutput::after_step(bool start) {
   const auto scope = timers_.scope("output");
   if (!start) gather();
   const auto& output = scene_.output;
-  if (history_ && (start || output.history_every_us <= 0 || due(output.history_every_us))) write_history();
+  if (start || output.history_every_us <= 0 || due(output.history_every_us)) {
+    if (history_) write_history();
+    energy_.sample(elastic_energy_);
+  }
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -120,6 +124,8 @@ void FlowOutput::write_history() {
   if (auto* membranes = simulation_.membranes()) {
     const auto cells = membranes->diagnostics();
     watch_cells(cells);
+    elastic_energy_ = 0;
+    for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
     for (int c = 0; c < simulation_.cells(); ++c) {
       auto sample = cell_sample(c, cells[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape + balance, none);
@@ -200,6 +206,21 @@ void FlowOutput::write_checkpoint_now() {
 #endif
 }
 
+void FlowOutput::fill_energy(Report& report) const {
+  if (const auto whole = energy_.imbalance()) report.errors["energy_balance"] = *whole;
+  const auto& t = energy_.totals();
+  auto& terms = report.extra["energy_fJ"];
+  terms = {{"boundaries", t.boundaries}, {"pressure_gradient", t.gradient}, {"dissipation", t.dissipation},
+           {"kinetic", t.kinetic}};
+  if (simulation_.rigid_bodies()) terms["on_bodies"] = t.on_bodies;
+  if (!simulation_.membranes()) return;
+  if (const auto own = energy_.coupling_imbalance()) report.errors["energy_balance_coupling"] = *own;
+  terms["on_cells"] = t.on_cells;
+  terms["elastic"] = t.elastic;
+  terms["membrane_dissipation"] = t.membrane_dissipation;
+  terms["membrane_kinetic"] = t.membrane_kinetic;
+}
+
 void FlowOutput::fill(Report& report) {
   auto& errors = report.errors;
   errors["max_divergence"] = divergence_;
@@ -229,6 +250,7 @@ void FlowOutput::fill(Report& report) {
                                  {"threshold_pg_per_um2_per_us", s.threshold},
                                  {"margin", s.margin()}};
   }
+  fill_energy(report);
   for (const auto& [name, value] : reference_errors(scene_, simulation_)) errors[name] = value;
   report.momentum_iterations = momentum_;
   report.pressure_iterations = pressure_;

@@ -1,7 +1,7 @@
 // What a flow run writes: history, fields, cells, checkpoints, and the error figures of the report.
 #pragma once
 
-#include "coupling/flow_simulation.hpp"
+#include "coupling/energy_balance.hpp"
 #include "output/cell_writer.hpp"
 #include "output/field_writer.hpp"
 #include "output/history.hpp"
@@ -34,6 +34,7 @@ class FlowOutput {
   void write_history();
   void write_fields();
   void write_cells();
+  void fill_energy(Report& report) const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
@@ -50,6 +51,8 @@ class FlowOutput {
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
   Tally momentum_, pressure_, coupling_, substeps_, residual_;
+  EnergyBalance energy_;
+  double elastic_energy_ = 0;  // of all cells at the last history sample, fJ
   double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
 };
 

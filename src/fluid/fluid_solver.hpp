@@ -21,6 +21,15 @@ struct FluidStatistics {
   double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
 };
 
+/// The flow's energy at one time. Powers are those of the fluid outside bodies.
+struct FluidEnergy {
+  double boundaries_nW = 0;      // in through the sides of the grid: pressure, viscous stress, carried kinetic energy
+  double gradient_nW = 0;        // of the imposed pressure gradient, over the whole volume
+  double dissipation_nW = 0;     // mu times the integral of |grad u|^2
+  double kinetic_fJ = 0;
+  double inflow_um3_per_us = 0;  // through all sides
+};
+
 class FluidSolver {
  public:
   /// @param shape   of the built-in grid, for inlet profiles; null for others
@@ -65,6 +74,8 @@ class FluidSolver {
 
   /// rms of the convective term over the rms of the viscous term in the present solution: what leaving it out neglects.
   double convection_over_viscosity();
+  /// @param body_volume  um3, of all bodies: what is left of the cells that their surfaces cut
+  FluidEnergy energy(double body_volume);
   /// Mean velocity over the whole volume (superficial, bodies count as present), um/us.
   Triple mean_velocity();
   /// Force on body `b` from the momentum balance over the faces around it: pressure and viscous stress, nN.

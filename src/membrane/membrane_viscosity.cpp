@@ -32,6 +32,10 @@ void MembraneViscosity::force(const MembraneViews& m, const Components<double>& 
   }
 }
 
+double MembraneViscosity::dissipation(const MembraneViews& m) const {
+  return tangential_ ? viscous_power<FullDamping>(m) : viscous_power<CentralDamping>(m);
+}
+
 int MembraneViscosity::iterations() const {
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.iterations);
   int largest = 0;

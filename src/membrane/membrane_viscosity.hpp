@@ -21,6 +21,9 @@ class MembraneViscosity {
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Components<double>& v, const Components<double>& force) const;
 
+  /// Power that it takes from the membranes at their present velocities, nW.
+  double dissipation(const MembraneViews& m) const;
+
   /// Iterations of the last velocity solve, the largest over the cells. Waits for the device.
   int iterations() const;
 

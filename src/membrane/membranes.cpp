@@ -240,6 +240,10 @@ std::vector<CellDiagnostics> Membranes::diagnostics() {
   return all;
 }
 
+double Membranes::kinetic_energy_fJ() const { return kinetic_energy(views_); }
+
+double Membranes::dissipation_nW() const { return viscosity_ ? viscosity_->dissipation(views_) : 0; }
+
 std::vector<double> Membranes::state() const {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.x);
   const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.v);

@@ -84,6 +84,10 @@ class Membranes {
   /// One entry a cell. Copies from the device: for output, not for every sub-step.
   std::vector<CellDiagnostics> diagnostics();
 
+  /// Kinetic energy of all cells' membranes, fJ, and the power that membrane viscosity takes from them, nW.
+  double kinetic_energy_fJ() const;
+  double dissipation_nW() const;
+
   /// Everything that a restart needs for the same bits as without the stop.
   std::vector<double> state() const;
   /// @throws InputError  if the length does not fit these cells

@@ -1,0 +1,50 @@
+// Where the energy that drives a flow goes: friction in the fluid and in membranes, storage, work on bodies that move as
+// prescribed. What is left over is an error that the run can know of itself.
+#pragma once
+
+#include "coupling/flow_simulation.hpp"
+
+#include <optional>
+
+namespace corpuscle {
+
+/// Work done since the first sample and energy stored since then, fJ (1 nW for 1 us).
+struct EnergyTotals {
+  double boundaries = 0;             // in through the sides of the grid
+  double gradient = 0;               // by the imposed pressure gradient
+  double dissipation = 0;            // in the fluid, integral of 2 mu D : D
+  double kinetic = 0;                // change of the fluid's
+  double on_cells = 0;               // by tractions
+  double on_bodies = 0;              // by tractions, on those that move as prescribed
+  double elastic = 0;                // change of the membranes'
+  double membrane_dissipation = 0;
+  double membrane_kinetic = 0;       // change
+};
+
+class EnergyBalance {
+ public:
+  explicit EnergyBalance(FlowSimulation& simulation) : simulation_(simulation) {}
+
+  /// Add what happened since the last sample, by the trapezoidal rule in time: as exact as the samples are close. The
+  /// last tractions must belong to the present state.
+  /// @param elastic_fJ  of all membranes at present
+  void sample(double elastic_fJ);
+
+  const EnergyTotals& totals() const { return totals_; }
+  /// What is not accounted for, over the largest term. None before there are two samples, or where nothing moves.
+  std::optional<double> imbalance() const;
+  /// The part of it between fluid and membranes: the work of tractions against what the membranes stored and dissipated.
+  std::optional<double> coupling_imbalance() const;
+  /// Mean pressure that drives the flow through the sides at the last sample: power over volume flow, kPa. Zero where
+  /// nothing flows in.
+  double driving_pressure_kPa() const { return driving_pressure_; }
+
+ private:
+  FlowSimulation& simulation_;
+  EnergyTotals totals_, rates_, first_;  // rates in nW; contents of the first sample, in fJ
+  double driving_pressure_ = 0;
+  double time_ = 0;
+  long samples_ = 0;
+};
+
+}  // namespace corpuscle
