@@ -17,19 +17,18 @@ class ManufacturedFlow(ExternalProblem):
     what = ("An Arnold-Beltrami-Childress flow that varies in time, with body forces that make it exact, on a skewed and "
             "warped cube of 2 um, to 0.4 us; rms errors over the flow's rms velocity (1.1 um/us) and pressure (0.5 kPa).")
     errors = {"velocity_error_pc": "velocity", "pressure_error_pc": "pressure"}
-    default = {"cells": 16, "steps": 16, "projection": "fractional_step", "momentum_tolerance": 1e-6}
+    default = {"cells": 16, "steps": 16, "momentum_tolerance": 1e-6}
 
     def sweeps(self):
         return {"cells": [8, 12, 16, 24, 32] + ([48, 64] if self.full else []),
                 "steps": [4, 8, 16, 32] + ([64, 128] if self.full else []),
-                "projection": ["fractional_step", "iterated"],
                 "momentum_tolerance": [1e-2, 1e-3, 1e-4, 1e-6, 1e-9]}
 
     def combinations(self):
         return [{"cells": n, "steps": s} for n, s in [(12, 8), (24, 24), (32, 16)] + ([(48, 48)] if self.full else [])]
 
     def arguments(self, s):
-        return [s["cells"], 0.4 / s["steps"], s["steps"], s["projection"], s["momentum_tolerance"]]
+        return [s["cells"], 0.4 / s["steps"], s["steps"], s["momentum_tolerance"]]
 
     def quantities(self, settings, outcome):
         return {"velocity_error_pc": 100 * outcome.report["velocity_error"] / 1.1,
@@ -43,7 +42,7 @@ class PlainTube(Problem):
             "times within the ramp (4 to 20 us), the largest of them; the exact flow for the imposed flow rate comes from "
             "the radial diffusion equation on a grid of 400 points, since far from the inlet it depends on r and t alone.")
     errors = {"developed_error_pc": "developed flow", "startup_error_pc": "start-up"}
-    default = {"nodes": "31x31x51", "step_us": 1, "cross_section": "conformal", "projection": "fractional_step",
+    default = {"nodes": "31x31x51", "step_us": 1, "cross_section": "conformal",
                "convection": True, **SOLVER, **CORES}
     radius, mean, ramp, end = 5.0, 2e-3, 20.0, 48
 
@@ -51,7 +50,7 @@ class PlainTube(Problem):
         return {"nodes": ["16x16x26", "21x21x35", "26x26x43", "31x31x51", "41x41x67"]
                 + (["61x61x101", "81x81x134"] if self.full else []),
                 "step_us": [8, 4, 2, 1, 0.5] + ([0.25] if self.full else []),
-                "cross_section": ["elliptical", "conformal"], "projection": ["fractional_step", "iterated"],
+                "cross_section": ["elliptical", "conformal"],
                 "convection": [False, True, "implicit"], "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8],
                 "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
@@ -117,13 +116,13 @@ class SphereArray(Problem):
             "against Zick and Homsy (1982), K = 4.292: from the momentum balance and from the tractions on the surface.")
     errors = {"tractions_error_pc": "drag from tractions", "balance_error_pc": "drag from balance"}
     default = {"nodes_per_diameter": 12, "step_us": 10, "body_vertices": "from spacing (0)",
-               "projection": "fractional_step", **SOLVER}
+               **SOLVER}
 
     def sweeps(self):
         return {"nodes_per_diameter": [6, 8, 12, 16, 24] + ([32, 48] if self.full else []),
                 "step_us": [30, 10, 3],
                 "body_vertices": [100, 300, "from spacing (0)", 1200, 3000],
-                "projection": ["fractional_step", "iterated"], "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8],
+                "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8],
                 "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
     def combinations(self):
@@ -158,11 +157,11 @@ class MovingSphere(Problem):
             "that of the momentum balance in the finest run (no exact answer exists for this box).")
     errors = {"jitter_pc": "jitter of the force", "drag_error_pc": "mean drag from tractions"}
     default = {"nodes_per_diameter": 12, "step_us": 1, "body_vertices": "from spacing (0)",
-               "projection": "fractional_step", **SOLVER}
+               **SOLVER}
 
     def sweeps(self):
         return {"nodes_per_diameter": [8, 12, 16] + ([24, 32] if self.full else [24]), "step_us": [4, 2, 1, 0.5],
-                "body_vertices": [200, "from spacing (0)", 2000], "projection": ["fractional_step", "iterated"],
+                "body_vertices": [200, "from spacing (0)", 2000],
                 "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8], "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
     def combinations(self):
@@ -279,7 +278,7 @@ class CellInTube(Problem):
     errors = {"outline_error_pc": "outline", "same_mesh_error_pc": "outline, same mesh", "speed_error_pc": "cell speed"}
     radius_um = 3.9
     default = {"nodes": "31x31x51", "step_us": 2, "vertices": 500, "scheme": "robin", "coupling_tolerance": "unused by robin",
-               "robin_coefficient": "pi mu / h", "convection": True, "projection": "fractional_step", **SOLVER, **CORES}
+               "robin_coefficient": "pi mu / h", "convection": True, **SOLVER, **CORES}
 
     def __init__(self, full):
         super().__init__(full)
@@ -299,7 +298,6 @@ class CellInTube(Problem):
                 "scheme": [{"scheme": "loose"}, {}] + aitken,
                 "robin_coefficient": [30, 20, "pi mu / h", 10] if self.full else [20, "pi mu / h", 10],
                 "convection": [False, True] + (["implicit"] if self.full else []),
-                "projection": ["fractional_step", "iterated"],
                 "momentum_tolerance": ([1e-2] if self.full else []) + [1e-3, 1e-4, 1e-6] + ([1e-8] if self.full else []),
                 "divergence_tolerance": [1e-6] + ([1e-8] if self.full else []) + [5e-11]}
 

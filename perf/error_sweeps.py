@@ -8,7 +8,7 @@ import numpy as np
 import study
 
 KEYS = {"nodes": "grid.nodes", "step_us": "time.step_us", "vertices": "cells.0.vertices", "spin_deg": "cells.0.spin_deg",
-        "cross_section": "grid.cross_section", "convection": "fluid.convection", "projection": "fluid.projection",
+        "cross_section": "grid.cross_section", "convection": "fluid.convection",
         "momentum_tolerance": "fluid.momentum_tolerance", "divergence_tolerance": "fluid.divergence_tolerance",
         "scheme": "coupling.scheme", "coupling_tolerance": "coupling.tolerance",
         "robin_coefficient": "coupling.robin_coefficient_pg_per_um2_per_us", "force_steps": "stretching.steps",

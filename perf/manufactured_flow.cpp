@@ -1,8 +1,7 @@
 // One run of the manufactured flow on the skewed cube, for perf/error_vs_time:
-//   manufactured_flow CELLS STEP_US STEPS fractional_step|iterated MOMENTUM_TOLERANCE
+//   manufactured_flow CELLS STEP_US STEPS MOMENTUM_TOLERANCE
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 
 #include "manufactured.hpp"
 #include "program.hpp"
@@ -13,10 +12,7 @@ namespace {
 
 void solve(char** argv) {
   FluidSettings settings;
-  const bool iterated = std::strcmp(argv[4], "iterated") == 0;
-  settings.projection = iterated ? FluidSettings::Projection::iterated : FluidSettings::Projection::fractional_step;
-  settings.projection_max_iterations = 100;
-  settings.momentum_tolerance = std::atof(argv[5]);
+  settings.momentum_tolerance = std::atof(argv[4]);
   const auto start = std::chrono::steady_clock::now();
   const auto errors = manufactured::run(Comm(), manufactured::skewed_cube(std::atoi(argv[1])), std::atof(argv[2]),
                                         std::atoi(argv[3]), settings);
@@ -28,6 +24,6 @@ void solve(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_program(argc, argv, 5, "CELLS STEP_US STEPS fractional_step|iterated MOMENTUM_TOLERANCE",
+  return run_program(argc, argv, 4, "CELLS STEP_US STEPS MOMENTUM_TOLERANCE",
                      [](int, char** words) { solve(words); });
 }

@@ -123,7 +123,7 @@ def fault(setup, run):
         return "not finite: report.json"
     if setup.case == "stretch.toml" or not run.history:  # there the volume is held by a penalty
         return None
-    for name, bound in (("volume_drift", 1e-3), ("area_drift", 0.2)):
+    for name, bound in (("volume_drift", 1e-3), ("area_drift", 0.1)):
         if run.report["errors"].get(name) is not None and run.report["errors"][name] > bound:
             return f"done with {name} = {run.report['errors'][name]:.2g}"
     speed, mean = run.history[-1]["velocity_z_mm_per_s"], setup.overrides.get(SPEED, 2)

@@ -1,6 +1,7 @@
 #include "app/flow_output.hpp"
 
 #include "app/reference_flows.hpp"
+#include "core/error.hpp"
 #include "core/units.hpp"
 #include "coupling/restart.hpp"
 #include "membrane/shape_measures.hpp"
@@ -96,7 +97,14 @@ void FlowOutput::after_step(bool start) {
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     volume_drift_ = std::max(volume_drift_, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
-    area_drift_ = std::max(area_drift_, std::abs(cells[c].area_um2 / first_area_[c] - 1));
+    const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
+    area_drift_ = std::max(area_drift_, drift);
+    if (drift > senseless_area)
+      throw ComputationError(fmt::format(
+          "membrane: the area of cells.{} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
+          "cause: a load beyond the model; reduce the flow (the boundaries' velocities, fluid.pressure_gradient_Pa_per_um) or "
+          "its ramp, or raise cells.{}.area_modulus_uN_per_m",
+          c, 100 * drift, 100 * lysis_area, c));
   }
 }
 
@@ -121,6 +129,7 @@ HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d) const 
 void FlowOutput::write_history() {
   const std::size_t shape = shape_columns.size(), balance = balance_columns.size();
   const double none = std::nan("");
+  last_.clear();
   if (auto* membranes = simulation_.membranes()) {
     const auto cells = membranes->diagnostics();
     watch_cells(cells);
@@ -130,6 +139,7 @@ void FlowOutput::write_history() {
       auto sample = cell_sample(c, cells[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape + balance, none);
       history_->write(sample);
+      last_.push_back(sample);
     }
   }
   auto* bodies = simulation_.rigid_bodies();
@@ -152,6 +162,7 @@ void FlowOutput::write_history() {
     if (simulation_.membranes()) sample.more.assign(shape, none);
     for (double f : balance_force[number]) sample.more.push_back(f);
     history_->write(sample);
+    last_.push_back(sample);
   }
 }
 
@@ -221,11 +232,35 @@ void FlowOutput::fill_energy(Report& report) const {
   terms["membrane_kinetic"] = t.membrane_kinetic;
 }
 
+void FlowOutput::fill_quantities(Report& report) const {
+  auto& all = report.quantities;
+  const char* axes[] = {"x", "y", "z"};
+  for (const auto& sample : last_) {
+    const bool cell = sample.cell < simulation_.cells();
+    const std::string of = fmt::format("{}_{}_", cell ? "cell" : "body", sample.cell);
+    if (cell) {
+      const auto& v = *sample.velocity_um_per_us;
+      all[of + "speed_mm_per_s"] = std::hypot(v[0], v[1], v[2]) / units::mm_per_s;
+      all[of + "area_um2"] = *sample.area_um2;
+      all[of + "elastic_energy_fJ"] = *sample.elastic_energy_fJ;
+      for (std::size_t n = 0; n < shape_columns.size(); ++n) all[of + shape_columns[n]] = sample.more[n];
+    }
+    for (int d = 0; d < 3; ++d) {
+      if (cell) all[of + "centroid_" + axes[d] + "_um"] = (*sample.centroid_um)[d];
+      if (!cell) all[of + "force_" + axes[d] + "_nN"] = (*sample.force_nN)[d];
+      if (!cell) all[of + "torque_" + axes[d] + "_nN_um"] = (*sample.torque_nN_um)[d];
+    }
+  }
+  const Triple mean = simulation_.fluid().mean_velocity();
+  all["superficial_speed_mm_per_s"] = std::hypot(mean[0], mean[1], mean[2]) / units::mm_per_s;
+  if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
+}
+
 void FlowOutput::fill(Report& report) {
   auto& errors = report.errors;
   errors["max_divergence"] = divergence_;
   errors["flux_correction"] = flux_correction_;
-  errors["splitting"] = simulation_.fluid().statistics().splitting;
+  errors["splitting"] = simulation_.fluid().splitting();
   errors["convection_over_viscosity"] = simulation_.fluid().convection_over_viscosity();
   if (simulation_.surfaces()) {
     errors["slip"] = slip_;
@@ -251,6 +286,7 @@ void FlowOutput::fill(Report& report) {
                                  {"margin", s.margin()}};
   }
   fill_energy(report);
+  fill_quantities(report);
   for (const auto& [name, value] : reference_errors(scene_, simulation_)) errors[name] = value;
   report.momentum_iterations = momentum_;
   report.pressure_iterations = pressure_;

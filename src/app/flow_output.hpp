@@ -18,7 +18,12 @@ class FlowOutput {
   FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
              std::optional<double> restart_us);
 
+  /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
+  /// a run warns at its end, beyond the second it is stopped.
+  static constexpr double lysis_area = 0.04, senseless_area = 0.1;
+
   /// After every step (and before the first, with `start`): whatever is due.
+  /// @throws ComputationError  when a file cannot be written, or a membrane has stretched far beyond what one can
   void after_step(bool start = false);
   /// The state as it is, at the end of a run that has finished or broken down.
   void write_checkpoint_now();
@@ -35,6 +40,7 @@ class FlowOutput {
   void write_fields();
   void write_cells();
   void fill_energy(Report& report) const;
+  void fill_quantities(Report& report) const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
@@ -52,6 +58,7 @@ class FlowOutput {
   std::vector<double> first_area_, first_volume_;
   Tally momentum_, pressure_, coupling_, substeps_, residual_;
   EnergyBalance energy_;
+  std::vector<HistorySample> last_;  // of every cell and body, at the last history sample
   double elastic_energy_ = 0;  // of all cells at the last history sample, fJ
   double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
 };

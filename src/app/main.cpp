@@ -2,6 +2,7 @@
 #include "app/run.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "input/case.hpp"
 #include "output/report.hpp"
 
 #include <CLI/CLI.hpp>
@@ -10,6 +11,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <thread>
 
 #ifdef _OPENMP
@@ -71,39 +73,62 @@ void share_cores(const Comm& comm) {
 #endif
 }
 
-int parse_and_run(int argc, char** argv, const Comm& comm) {
-  CLI::App app{"Red blood cells in flowing plasma"};
-  app.require_subcommand(1);
-  app.set_version_flag("--version", "corpuscle " + git_hash());
+struct Command {
+  enum class Kind { run, check, mesh } kind = Kind::run;
   RunOptions options;
   int vertices = 0;
   std::string mesh_path;
+};
 
+/// @throws CLI::ParseError  for what is not a command line of this program, and for --help and --version
+Command parse(CLI::App& app, int argc, char** argv) {
+  Command command;
+  RunOptions& options = command.options;
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "corpuscle " + git_hash());
   auto* run = app.add_subcommand("run", "run a case to its end");
   run->add_option("case", options.case_path, "case file (TOML)")->required();
   run->add_option("--out", options.folder, "folder for the results (default: runs/<case>)");
   run->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
   run->add_option("--restart", options.restart, "checkpoint.h5 to continue from");
+  run->add_flag("--estimate-error{all}", options.estimate,
+                "error bars from further, coarser runs: spacing, step, vertices (comma-separated), or all");
   auto* check = app.add_subcommand("check", "validate a case; list modules, unknowns, memory and time; run nothing");
   check->add_option("case", options.case_path, "case file (TOML)")->required();
   check->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
   auto* mesh = app.add_subcommand("mesh", "write the surface mesh of a resting red cell");
-  mesh->add_option("--vertices", vertices, "how many vertices, 200 to 30000")->required();
-  mesh->add_option("-o,--output", mesh_path, "file to write (.off or .stl)")->required();
+  mesh->add_option("--vertices", command.vertices, "how many vertices, 200 to 30000")->required();
+  mesh->add_option("-o,--output", command.mesh_path, "file to write (.off or .stl)")->required();
 
+  std::vector<std::string> words;  // last first, as the parser wants them; Kokkos takes its own options
+  for (int n = argc - 1; n > 0; --n)
+    if (std::string(argv[n]).rfind("--kokkos-", 0) != 0) words.push_back(argv[n]);
+  app.parse(words);
+  command.kind = *run ? Command::Kind::run : (*check ? Command::Kind::check : Command::Kind::mesh);
+  return command;
+}
+
+/// Whether a process that starts alone gets by without message passing, whose start-up takes longer than many a
+/// stretching test. A launcher has set one of these variables for each of its processes.
+bool can_stay_alone(const Command& command) {
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID",
+                           "PALS_RANKID", "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
+    if (std::getenv(name)) return false;
+  if (command.kind == Command::Kind::mesh) return true;
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (comm.root()) app.exit(error);
-    return error.get_exit_code() == 0 ? 0 : input_is_wrong;
+    return read_case(command.options.case_path, command.options.overrides).stretching.has_value();
+  } catch (const InputError&) {
+    return true;  // all there is to do is to say so
   }
+}
+
+int execute(const Comm& comm, const Command& command) {
   return run_command(comm, [&] {
-    if (*run)
-      run_case(comm, options);
-    else if (*check)
-      check_case(comm, options);
-    else
-      write_mesh(vertices, mesh_path);
+    switch (command.kind) {
+      case Command::Kind::run: return run_case(comm, command.options);
+      case Command::Kind::check: return check_case(comm, command.options);
+      case Command::Kind::mesh: return write_mesh(command.vertices, command.mesh_path);
+    }
   });
 }
 
@@ -111,20 +136,34 @@ int parse_and_run(int argc, char** argv, const Comm& comm) {
 
 int main(int argc, char** argv) {
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
+  CLI::App app{"Red blood cells in flowing plasma", "corpuscle"};
+  Command command;
+  std::unique_ptr<CLI::ParseError> refused;
+  try {
+    command = parse(app, argc, argv);
+  } catch (const CLI::ParseError& error) {
+    refused = std::make_unique<CLI::ParseError>(error);
+  }
 #ifdef CORPUSCLE_MPI
-  MPI_Init(&argc, &argv);
+  const bool alone = can_stay_alone(command);
+  if (!alone) MPI_Init(&argc, &argv);
 #endif
   int code = 0;
   {
     const Comm comm;
     open_log(comm.root());
-    share_cores(comm);
-    Kokkos::initialize(argc, argv);
-    code = parse_and_run(argc, argv, comm);
-    Kokkos::finalize();
+    if (refused) {
+      if (comm.root()) app.exit(*refused);
+      code = refused->get_exit_code() == 0 ? 0 : input_is_wrong;
+    } else {
+      share_cores(comm);
+      Kokkos::initialize(argc, argv);
+      code = execute(comm, command);
+      Kokkos::finalize();
+    }
   }
 #ifdef CORPUSCLE_MPI
-  MPI_Finalize();
+  if (!alone) MPI_Finalize();
 #endif
   return code;
 }

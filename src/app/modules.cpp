@@ -1,24 +1,54 @@
 #include "app/modules.hpp"
 
 #include "core/log.hpp"
+#include "grid/index_space.hpp"
 #include "output/report.hpp"
 
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace corpuscle {
 
+namespace {
+
+/// Nodes of all ranks' blocks with their halos; those of a grid from a file are not known yet.
+std::optional<double> padded_nodes(const Case& scene) {
+  if (!scene.grid || scene.grid->generator == GridSettings::Generator::file) return std::nullopt;
+  double nodes = 1;
+  for (int n : scene.grid->nodes) nodes *= n - 1 + 2 * IndexSpace::halo;
+  return nodes;
+}
+
+/// Counted from the definitions of the modules' arrays and the kernels that their steps launch.
+std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) {
+  const auto nodes = padded_nodes(scene);
+  if (module == "convection" && nodes) return ModuleCost{5, *nodes * 6 * 8 * 1e-6};
+  if (module == "immersed search" && nodes) return ModuleCost{38, *nodes * 51 * 1e-6};
+  if (module == "membrane viscosity" && !scene.cells.empty()) {
+    double vertices = 0;
+    for (const auto& cell : scene.cells) {
+      if (!cell.mesh.empty()) return std::nullopt;
+      vertices += cell.vertices;
+    }
+    return ModuleCost{3, (18 + 22) * 8 * vertices * 1e-6};
+  }
+  if (module == "field output" && nodes) return ModuleCost{0, *nodes * 33 * 1e-6};
+  return std::nullopt;
+}
+
+}  // namespace
+
 ModuleList list_modules(const Case& scene, int ranks) {
   ModuleList list;
-  const auto add = [&](const char* name, bool active) { (active ? list.active : list.left_out).push_back(name); };
+  const auto add = [&](const std::string& name, bool active) { (active ? list.active : list.left_out).push_back(name); };
   const bool fluid = scene.fluid.has_value(), cells = !scene.cells.empty(), bodies = !scene.bodies.empty();
   const bool viscous = std::any_of(scene.cells.begin(), scene.cells.end(),
                                    [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; });
   const bool files = outputs_left_out(scene.output).empty();
   add("fluid", fluid);
   add("convection", fluid && scene.fluid->convection != FluidSettings::Convection::none);
-  add("iterated projection", fluid && scene.fluid->projection == FluidSettings::Projection::iterated);
   add("immersed search", fluid && (cells || bodies));
   add("rigid bodies", bodies);
   add("membrane", cells);
@@ -29,12 +59,26 @@ ModuleList list_modules(const Case& scene, int ranks) {
   add("field output", fluid && files && scene.output.fields);
   add("cell output", (cells || bodies) && files && scene.output.cells);
   add("checkpoint", fluid && files);
+  for (const auto& name : list.left_out)
+    if (const auto cost = cost_of(name, scene)) list.cost[name] = *cost;
   return list;
 }
 
 void print_modules(const ModuleList& modules) {
+  std::vector<std::string> left_out;
+  for (const auto& name : modules.left_out) {
+    const auto cost = modules.cost.find(name);
+    if (cost == modules.cost.end()) {
+      left_out.push_back(name);
+    } else if (cost->second.kernels == 0) {
+      left_out.push_back(fmt::format("{} ({:.2g} MB)", name, cost->second.megabytes));
+    } else {
+      left_out.push_back(
+          fmt::format("{} ({} kernels a step, {:.2g} MB)", name, cost->second.kernels, cost->second.megabytes));
+    }
+  }
   info("active:   {}", fmt::join(modules.active, ", "));
-  info("left out: {}", modules.left_out.empty() ? "nothing" : fmt::format("{}", fmt::join(modules.left_out, ", ")));
+  info("left out: {}", left_out.empty() ? "nothing" : fmt::format("{}", fmt::join(left_out, ", ")));
 }
 
 }  // namespace corpuscle

@@ -1,5 +1,6 @@
 #include "app/run.hpp"
 
+#include "app/error_estimate.hpp"
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
 #include "core/error.hpp"
@@ -11,6 +12,8 @@
 #include "output/checkpoint.hpp"
 #include "output/on_root.hpp"
 #include "output/owned_values.hpp"
+
+#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cmath>
@@ -40,6 +43,8 @@ Report start_report(const Comm& comm, const Case& scene) {
   const auto modules = list_modules(scene, comm.size());
   report.active = modules.active;
   report.left_out = modules.left_out;
+  for (const auto& [name, cost] : modules.cost)
+    report.left_out_cost[name] = {{"kernels_per_step", cost.kernels}, {"memory_mb", cost.megabytes}};
   return report;
 }
 
@@ -52,15 +57,17 @@ void print_end(const Report& report, const std::string& folder) {
   for (const auto& [name, value] : report.errors.items())
     if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
   info("errors:{}", errors);
-  constexpr double lysis = 0.04;  // Evans, Waugh and Melnik, Biophys. J. 16, 1976: membranes break at 2 to 4 %
+  const double lysis = FlowOutput::lysis_area;
   const auto drift = report.errors.find("area_drift");
   if (drift != report.errors.end() && drift->is_number() && drift->get<double>() > lysis)
     warn("a cell's area changed by {:.0f} %: a real membrane breaks at about 4 %, so this load is beyond the model",
          100 * drift->get<double>());
+  if (!report.quantities.empty()) info("at the end:");
+  print_quantities(report);
   info("results in {}", folder);
 }
 
-void run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const std::string& folder) {
+Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const std::string& folder) {
   const auto start = Clock::now();
   Timers timers;
   FlowSimulation simulation(comm, scene, timers);
@@ -111,10 +118,10 @@ void run_flow(const Comm& comm, const Case& scene, const RunOptions& options, co
   report.wall_s = seconds_since(start);
   report.wall_s_by_part = timers.seconds();
   write_report(folder, comm, report);
-  print_end(report, folder);
+  return report;
 }
 
-void run_stretching(const Comm& comm, const Case& scene, const std::string& folder) {
+Report run_stretching(const Comm& comm, const Case& scene, const std::string& folder) {
   const auto start = Clock::now();
   Timers timers;
   Report report = start_report(comm, scene);
@@ -173,10 +180,49 @@ void run_stretching(const Comm& comm, const Case& scene, const std::string& fold
     report.errors["experiment_points_inside_bars"] = comparison.inside_both;
     report.errors["experiment_points"] = comparison.points;
   }
+  report.quantities = {{"axial_um", last.axial_um},
+                       {"transverse_um", last.transverse_um},
+                       {"rest_diameter_um", result.rest.diameter_um},
+                       {"rest_thickness_center_um", result.rest.thickness_center_um},
+                       {"rest_thickness_max_um", result.rest.thickness_max_um}};
   report.wall_s = seconds_since(start);
   report.wall_s_by_part = timers.seconds();
   write_report(folder, comm, report);
-  print_end(report, folder);
+  return report;
+}
+
+Report run_scene(const Comm& comm, const Case& scene, const RunOptions& options, const std::string& folder) {
+  return scene.stretching ? run_stretching(comm, scene, folder) : run_flow(comm, scene, options, folder);
+}
+
+/// Error bars from coarser runs, each with its own report beside the main run's. A coarser run may be refused or break
+/// down where the main one did not: then the report says so instead.
+void estimate_errors(const Comm& comm, const Case& scene, const RunOptions& options, const std::vector<CoarserRun>& runs,
+                     const std::string& folder, Report& report) {
+  for (const auto& run : runs) {
+    info("error bars: the same with {}", fmt::join(run.overrides, ", "));
+    auto overrides = options.overrides;
+    overrides.insert(overrides.end(), run.overrides.begin(), run.overrides.end());
+    for (const char* off : {"output.fields=false", "output.cells=false"}) overrides.emplace_back(off);
+    const std::string own_folder = folder + "/coarser_" + run.kind;
+    std::string reason;
+    try {
+      const Case coarser = read_case(scene.path, overrides);
+      on_root(comm, [&] { prepare_folder(own_folder); });
+      open_log(comm.root(), true);
+      add_error_bars(report, run, run_scene(comm, coarser, {}, own_folder));
+    } catch (const InputError& error) {
+      reason = error.what();
+    } catch (const ComputationError& error) {
+      if (comm.size() > 1) throw;  // perhaps on some ranks only; the main run's report is written
+      reason = error.what();
+    }
+    open_log(comm.root());
+    if (reason.empty()) continue;
+    warn("no error bars from {}: {}", run.kind, reason);
+    report.extra["error_estimate"].push_back({{"coarser", run.kind}, {"ratio", run.ratio}, {"failed", reason}});
+  }
+  write_report(folder, comm, report);
 }
 
 std::string result_folder(const RunOptions& options) {
@@ -189,19 +235,21 @@ std::string result_folder(const RunOptions& options) {
 void run_case(const Comm& comm, const RunOptions& options) {
   const Case scene = read_case(options.case_path, options.overrides);
   const std::string folder = result_folder(options);
+  if (!options.estimate.empty() && !options.restart.empty())
+    throw InputError("--estimate-error compares whole runs: leave out --restart");
+  if (scene.stretching && !options.restart.empty())
+    throw InputError("--restart: a stretching test has no checkpoints; run it again");
+  if (scene.stretching && comm.size() > 1)
+    throw InputError(fmt::format("a stretching test runs on one rank, not {}: start it without mpirun", comm.size()));
+  const auto coarser = options.estimate.empty() ? std::vector<CoarserRun>{} : coarser_runs(scene, options.estimate);
   on_root(comm, [&] {
     prepare_folder(folder);
     std::filesystem::remove(folder + "/report.json");  // of an earlier run: this one may not get to write its own
   });
   print_start(comm, scene);
-  if (scene.stretching) {
-    if (!options.restart.empty()) throw InputError("--restart: a stretching test has no checkpoints; run it again");
-    if (comm.size() > 1)
-      throw InputError(fmt::format("a stretching test runs on one rank, not {}: start it without mpirun", comm.size()));
-    run_stretching(comm, scene, folder);
-  } else {
-    run_flow(comm, scene, options, folder);
-  }
+  Report report = run_scene(comm, scene, options, folder);
+  if (!coarser.empty()) estimate_errors(comm, scene, options, coarser, folder, report);
+  print_end(report, folder);
 }
 
 void check_case(const Comm& comm, const RunOptions& options) {
@@ -229,8 +277,8 @@ void check_case(const Comm& comm, const RunOptions& options) {
     info("membrane: undamped stable step {:.3g} us, {} sub-steps a step", stable,
          membranes.substeps(scene.time.step_us, s.beta));
   }
-  // Seconds per cell and step on one core: of the tube without and with a cell, an order of magnitude.
-  const double rate = simulation.surfaces() ? 3e-6 : 1.5e-6;
+  // Seconds per cell and step on one core, measured with the tube; about ten times that on skewed grids.
+  const double rate = simulation.grid().orthogonal() ? 1.1e-6 : 1e-5;
   const double cores = static_cast<double>(comm.size()) * thread_count();
   info("estimate: {:.0f} MB, {} steps, about {:.2g} s", comm.sum(peak_rss_mb()), simulation.total_steps(),
        rate * nodes * simulation.total_steps() / cores);

@@ -13,9 +13,10 @@ struct RunOptions {
   std::string folder;                  // empty: runs/<name of the case file>
   std::vector<std::string> overrides;  // section.key=value
   std::string restart;                 // checkpoint to continue from; empty: from the start
+  std::string estimate;                // coarser runs for error bars (error_estimate.hpp); empty: none
 };
 
-/// Run a case to its end. @throws InputError, ComputationError
+/// Run a case to its end, and then the coarser runs for its error bars. @throws InputError, ComputationError
 void run_case(const Comm& comm, const RunOptions& options);
 
 /// Validate a case and print modules, unknowns and estimates of memory and time; run nothing. @throws InputError

@@ -65,7 +65,8 @@ void ImmersedFlow::check_resolution() {
     const long nodes = fluid_.grid().comm().sum(static_cast<long>(counts.body_immersed[b] + counts.body_inside[b]));
     if (nodes == 0)
       throw ComputationError(fmt::format(
-          "body {}: no grid node lies in or next to it, so the flow does not see it: refine the grid (grid.nodes)", b));
+          "{}: no grid node lies in or next to it, so the flow does not see it: refine the grid (grid.nodes)",
+          body_name(surfaces_, b)));
   }
 }
 

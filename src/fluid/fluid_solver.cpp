@@ -159,7 +159,7 @@ void FluidSolver::begin_step(double dt) {
     if (settings_.convection == FluidSettings::Convection::extrapolated) Kokkos::deep_copy(work_, u_);
   }
   ++history_levels_;
-  statistics_ = {0, 0, 0, 0, statistics_.reference_speed, 0, 0};
+  statistics_ = {0, 0, 0, 0, statistics_.reference_speed, 0};
 }
 
 void FluidSolver::abandon_step() {
@@ -261,32 +261,18 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
     momentum_scales(grid_->index(), grid_->views().volume, kind_, diagonal_, mass_, mu_, operator_);
   assemble_history(time);
   complete_velocity(bodies);
-  const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
-  // A fractional step's answer depends on the pressure it starts from: every solve of a step starts from the same.
-  if (!iterated && statistics_.passes > 0) Kokkos::deep_copy(Exec(), p_, p_old_);
-  const int most = iterated ? settings_.projection_max_iterations : 1;
-  for (int pass = 0; pass < most; ++pass) {
-    const double residual = momentum_residual();
-    if (!std::isfinite(residual))
-      throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run, with convection "
-                             "most often a step longer than the flow takes across a cell; reduce time.step_us, or set "
-                             "fluid.convection = \"implicit\"");
-    statistics_.splitting = residual;
-    if (pass > 0 && residual < settings_.projection_tolerance) break;
-    solve_momentum(bodies, residual, pass);
-    statistics_.reference_speed =
-        std::max(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
-    project(bodies);
-    ++statistics_.passes;
-  }
-  if (iterated && statistics_.splitting >= settings_.projection_tolerance) {
-    statistics_.splitting = momentum_residual();
-    if (statistics_.splitting >= settings_.projection_tolerance)
-      throw ComputationError(fmt::format(
-          "velocity and pressure: the iterated projection stopped at {:.3g} after {} passes (wanted {:.3g}); reduce "
-          "time.step_us or raise fluid.projection_max_iterations",
-          statistics_.splitting, most, settings_.projection_tolerance));
-  }
+  // The answer depends on the pressure it starts from: every solve of a step starts from the same.
+  if (statistics_.solves > 0) Kokkos::deep_copy(Exec(), p_, p_old_);
+  const double residual = momentum_residual();
+  if (!std::isfinite(residual))
+    throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run, with convection "
+                           "most often a step longer than the flow takes across a cell; reduce time.step_us, or set "
+                           "fluid.convection = \"implicit\"");
+  solve_momentum(bodies, residual);
+  statistics_.reference_speed =
+      std::max(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
+  project(bodies);
+  ++statistics_.solves;
   grid_->halo().exchange(p_);
   if (bodies) {
     apply_pressure_rows(bodies->pressure, bodies->rows, p_);

@@ -1,5 +1,5 @@
 // Incompressible Navier-Stokes on one curvilinear block: second-order backward differences in time, viscous terms
-// implicit, rotational incremental fractional step, or that step iterated until no splitting error is left.
+// implicit, rotational incremental fractional step.
 #pragma once
 
 #include "core/timers.hpp"
@@ -14,10 +14,9 @@ namespace corpuscle {
 
 /// What one step needed and how well it did.
 struct FluidStatistics {
-  int momentum_iterations = 0, pressure_iterations = 0, passes = 0;
+  int momentum_iterations = 0, pressure_iterations = 0, solves = 0;
   double divergence = 0;       // largest net flux out of a fluid cell, um3/us
   double reference_speed = 0;  // um/us: the largest prescribed or computed so far
-  double splitting = 0;        // momentum residual that the last projection left, over the velocity (both 2-norms)
   double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
 };
 
@@ -72,6 +71,9 @@ class FluidSolver {
   /// solve, to set it and the given boundary velocities. For manufactured solutions and user forces.
   void set_body_force(const Components<double>& force, std::function<void(double)> update);
 
+  /// Residual of the momentum equation that the last projection left, over the velocity (both 2-norms): the splitting.
+  /// Right after solve() only.
+  double splitting() { return momentum_residual(); }
   /// rms of the convective term over the rms of the viscous term in the present solution: what leaving it out neglects.
   double convection_over_viscosity();
   /// @param body_volume  um3, of all bodies: what is left of the cells that their surfaces cut
@@ -107,7 +109,7 @@ class FluidSolver {
   void fill_halos(const Components<double>& u);
   void assemble_history(double time_us);
   double momentum_residual();
-  void solve_momentum(const EmbeddedBodies* bodies, double residual, int pass);
+  void solve_momentum(const EmbeddedBodies* bodies, double residual);
   void project(const EmbeddedBodies* bodies);
   KrylovResult solve_pressure(double target);
   void make_flux(const EmbeddedBodies* bodies);

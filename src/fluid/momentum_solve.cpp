@@ -88,15 +88,12 @@ double FluidSolver::residual_square() {
   return momentum_residual_square(operator_, rhs_, u_);
 }
 
-void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual, int pass) {
+void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) {
   const auto scope = timers_->scope("momentum");
   const double norm = residual_norm_;
-  const bool iterated = settings_.projection == FluidSettings::Projection::iterated;
-  // Within the iterated projection a pass gains about a factor of 5: solving its momentum further is wasted.
-  const double inner = iterated && pass > 0 ? 0.05 : 0.0;
   // Relative to the velocity; to the first residual in the first steps from rest, where there is no velocity yet.
   const double size = residual > 0 ? norm / residual : 0;
-  const double target = std::max(settings_.momentum_tolerance * std::max(size, norm), inner * norm);
+  const double target = settings_.momentum_tolerance * std::max(size, norm);
   const auto result = krylov_ ? solve_krylov(bodies, target) : iterate_momentum(bodies, norm, target);
   statistics_.momentum_iterations += result.iterations;
   if (!result.converged)

@@ -316,7 +316,8 @@ void ImmersedBoundary::set_location_state(const std::vector<double>& state) {
 std::string ImmersedBoundary::describe_vertex(int vertex) const {
   const Vec3 x = load(to_host(surface_.x), vertex);
   const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
-  return fmt::format("body {}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body, vertex - first, x.x, x.y, x.z);
+  return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y,
+                     x.z);
 }
 
 }  // namespace corpuscle

@@ -86,7 +86,7 @@ class ImmersedBoundary {
   /// repeat the same bits.
   std::vector<double> location_state() const;
   void set_location_state(const std::vector<double>& state);
-  /// "body 2, vertex 17 at (x, y, z) um"; copies from the device.
+  /// "bodies.2, vertex 17 at (x, y, z) um"; copies from the device.
   std::string describe_vertex(int vertex) const;
 
  private:

@@ -115,6 +115,10 @@ SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies) {
   return set;
 }
 
+std::string body_name(const SurfaceSet& surfaces, int body) {
+  return body < surfaces.cells ? "cells." + std::to_string(body) : "bodies." + std::to_string(body - surfaces.cells);
+}
+
 TriangleMesh body_mesh(const SurfaceSet& surfaces, int body) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.x);
   const auto triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.triangle);

@@ -2,6 +2,7 @@
 // both appear to the fluid as this.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/types.hpp"
@@ -13,6 +14,7 @@ namespace corpuscle {
 /// holds all surfaces.
 struct SurfaceSet {
   int bodies = 0, vertices = 0, triangles = 0;
+  int cells = 0;              // the first bodies are membranes, the others rigid
   Components<double> x;       // [vertex, 3] um
   Components<double> v;       // [vertex, 3] um/us
   Components<double> normal;  // [vertex, 3] outward unit normal, area weighted
@@ -31,6 +33,9 @@ struct SurfaceSet {
 /// All arrays allocated and filled: positions as given, velocities zero, normals and areas up to date.
 /// @throws InputError  if a mesh is not a closed surface
 SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies);
+
+/// As the case file addresses it: "cells.0", "bodies.2".
+std::string body_name(const SurfaceSet& surfaces, int body);
 
 /// Positions of one body's vertices and its triangles, copied back to the host.
 TriangleMesh body_mesh(const SurfaceSet& surfaces, int body);

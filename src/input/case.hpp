@@ -43,14 +43,10 @@ struct GridSettings {
 /// [fluid]
 struct FluidSettings {
   enum class Convection { none, extrapolated, implicit };
-  enum class Projection { fractional_step, iterated };
 
   double density_pg_per_um3 = 1.0;
   double kinematic_viscosity_um2_per_us = 1.1;
   Convection convection = Convection::extrapolated;
-  Projection projection = Projection::fractional_step;
-  double projection_tolerance = 1e-6;   // iterated: velocity change of one pass over the velocity
-  int projection_max_iterations = 30;
   double momentum_tolerance = 1e-6;     // relative residual; 1e-5 moves a cell by 1e-5 um in 400 us, 1e-6 by less
   double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
   int max_iterations = 2000;            // of either linear solver

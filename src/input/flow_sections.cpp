@@ -113,17 +113,11 @@ FluidSettings::Convection read_convection(Section& s) {
 }  // namespace
 
 FluidSettings read_fluid(Section& s) {
-  using Projection = FluidSettings::Projection;
   FluidSettings f;
   f.density_pg_per_um3 = s.number("density_pg_per_um3", positive(), f.density_pg_per_um3);
   f.kinematic_viscosity_um2_per_us =
       s.number("kinematic_viscosity_um2_per_us", positive(), f.kinematic_viscosity_um2_per_us);
   f.convection = read_convection(s);
-  f.projection = s.choice<Projection>(
-      "projection", {{"fractional_step", Projection::fractional_step}, {"iterated", Projection::iterated}},
-      f.projection);
-  f.projection_tolerance = s.number("projection_tolerance", between(1e-14, 0.1), f.projection_tolerance);
-  f.projection_max_iterations = s.integer("projection_max_iterations", 1, 10000, f.projection_max_iterations);
   f.momentum_tolerance = s.number("momentum_tolerance", between(1e-15, 0.1), f.momentum_tolerance);
   f.divergence_tolerance = s.number("divergence_tolerance", between(1e-16, 0.1), f.divergence_tolerance);
   f.max_iterations = s.integer("max_iterations", 1, 100000, f.max_iterations);

@@ -50,6 +50,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   }
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
   views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
+  views_.surface.cells = views_.cells;
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   start_x_ = Components<double>(label("start_x_vertex"), views_.vertices, 3);

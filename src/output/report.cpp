@@ -67,7 +67,7 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["kokkos"] = kokkos_configuration();
   json["ranks"] = comm.size();
   json["threads"] = thread_count();
-  json["modules"] = {{"active", report.active}, {"left_out", report.left_out}};
+  json["modules"] = {{"active", report.active}, {"left_out", report.left_out}, {"left_out_cost", report.left_out_cost}};
   json["steps"] = report.steps;
   json["simulated_us"] = report.simulated_us;
   json["wall_s"] = report.wall_s;
@@ -83,6 +83,8 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   for (const char* name :
        {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
     if (!json["errors"].contains(name)) json["errors"][name] = nullptr;
+  json["quantities"] = report.quantities;
+  if (!report.error_bars.empty()) json["error_bars"] = report.error_bars;
   const auto path = (std::filesystem::path(folder) / "report.json").string();
   on_root(comm,
           [&] { replace_text_file(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"); });

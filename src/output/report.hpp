@@ -26,6 +26,7 @@ struct Report {
   std::string case_path, title;
   std::string resolved;                       // every key with the value used, as TOML
   std::vector<std::string> active, left_out;  // modules
+  nlohmann::json left_out_cost = nlohmann::json::object();  // by module, where known: kernels_per_step, memory_mb
   long steps = 0;
   double simulated_us = 0;
   double wall_s = 0;
@@ -33,6 +34,8 @@ struct Report {
   Tally momentum_iterations, pressure_iterations, coupling_iterations, membrane_substeps;
   /// Error measures by name; those of the contract that a run does not have are written as null.
   nlohmann::json errors = nlohmann::json::object();
+  /// What the run is about, at its end, by names that carry the unit; and how far off these may be, where estimated.
+  std::map<std::string, double> quantities, error_bars;
   /// Further entries of the top level.
   nlohmann::json extra = nlohmann::json::object();
 };

@@ -4,14 +4,21 @@ namespace corpuscle {
 
 #ifdef CORPUSCLE_MPI
 
-void Comm::sum(double* values, int n) const { MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm_); }
-void Comm::max(double* values, int n) const { MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_MAX, comm_); }
+void Comm::sum(double* values, int n) const {
+  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm_);
+}
+void Comm::max(double* values, int n) const {
+  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_MAX, comm_);
+}
 long Comm::sum(long value) const {
-  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_LONG, MPI_SUM, comm_);
+  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_LONG, MPI_SUM, comm_);
   return value;
 }
-void Comm::barrier() const { MPI_Barrier(comm_); }
+void Comm::barrier() const {
+  if (size_ > 1) MPI_Barrier(comm_);
+}
 void Comm::broadcast(std::string& text) const {
+  if (size_ == 1) return;
   unsigned long length = text.size();
   MPI_Bcast(&length, 1, MPI_UNSIGNED_LONG, 0, comm_);
   text.resize(length);

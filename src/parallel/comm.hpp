@@ -13,7 +13,11 @@ namespace corpuscle {
 class Comm {
  public:
 #ifdef CORPUSCLE_MPI
+  /// Alone if message passing has not been started.
   explicit Comm(MPI_Comm comm = MPI_COMM_WORLD) : comm_(comm) {
+    int started = 0;
+    MPI_Initialized(&started);
+    if (!started) return;
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &size_);
   }

@@ -26,7 +26,7 @@ TEST_CASE("a cell carried out of the grid: the last good checkpoint is named, an
   };
   const auto outcome =
       fail(folder, fast("out", "time.end_us=30"), 3,
-           {"broke down at ", " us (step ", "position: body 0, vertex ", "outside the grid", "time.end_us"});
+           {"broke down at ", " us (step ", "position: cells.0, vertex ", "outside the grid", "time.end_us"});
   REQUIRE_FALSE(fs::exists(folder / "out/report.json"));
   const auto h = history(folder / "out");
   REQUIRE(h.lines.size() > 3);

@@ -92,17 +92,17 @@ TEST_CASE("case files that cannot be read") {
 
 TEST_CASE("cells where they cannot be") {
   SECTION("beyond the end of the grid") {
-    refuse("cells.0.center_um=[0,0,200]", {"body 0", "outside the grid", "center_um"});
+    refuse("cells.0.center_um=[0,0,200]", {"cells.0", "outside the grid", "center_um"});
   }
   SECTION("through the end of the grid") {
-    refuse("cells.0.center_um=[0,0,22]", {"body 0", "outside the grid", "center_um"});
+    refuse("cells.0.center_um=[0,0,22]", {"cells.0", "outside the grid", "center_um"});
   }
-  SECTION("beside the tube") { refuse("cells.0.center_um=[40,0,0]", {"body 0", "outside the grid", "center_um"}); }
-  SECTION("through the wall") { refuse("cells.0.center_um=[3,0,0]", {"body 0", "outside the grid", "center_um"}); }
+  SECTION("beside the tube") { refuse("cells.0.center_um=[40,0,0]", {"cells.0", "outside the grid", "center_um"}); }
+  SECTION("through the wall") { refuse("cells.0.center_um=[3,0,0]", {"cells.0", "outside the grid", "center_um"}); }
   // The resting cell's radius is 3.9 um in a tube of 5 um: this leaves 0.5 um, less than one spacing of the coarse
   // grid.
   SECTION("too near to the wall") {
-    refuse("cells.0.center_um=[0.6,0,0]", {"gap to the wall", "body 0", "grid spacings", "center_um", "grid.nodes"});
+    refuse("cells.0.center_um=[0.6,0,0]", {"gap to the wall", "cells.0", "grid spacings", "center_um", "grid.nodes"});
   }
 }
 

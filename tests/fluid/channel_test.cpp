@@ -8,7 +8,6 @@
 using namespace corpuscle;
 using namespace corpuscle::fluid_test;
 using Convection = FluidSettings::Convection;
-using Projection = FluidSettings::Projection;
 
 namespace {
 
@@ -112,9 +111,7 @@ TEST_CASE("a pressure gradient along two directions drives the flow against it",
 TEST_CASE("the divergence vanishes after every step", "[fluid]") {
   using Map = GridSettings::CrossSection;
   const auto map = GENERATE(Map::conformal, Map::elliptical);
-  const auto projection = GENERATE(Projection::fractional_step, Projection::iterated);
   FluidSettings settings;
-  settings.projection = projection;
   const GridSettings shape = tube(12, 20, map);
   Grid grid(Comm(), make_node_source(shape), {false, false, false});
   FluidSolver solver(grid, settings, tube_sides(20), &shape);

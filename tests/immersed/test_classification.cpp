@@ -242,7 +242,7 @@ TEST_CASE("vertices beyond a boundary and close to a wall are reported") {
   ib.classify();
   REQUIRE(ib.counts().lost_vertex >= 162);
   CHECK(ib.counts().owned_vertices < surface.vertices);
-  CHECK(ib.describe_vertex(ib.counts().lost_vertex).find("body 1, vertex ") == 0);
+  CHECK(ib.describe_vertex(ib.counts().lost_vertex).find("bodies.1, vertex ") == 0);
 }
 
 TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body") {

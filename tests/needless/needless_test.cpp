@@ -18,8 +18,8 @@ using needless::Recorder;
 
 namespace {
 
-/// Labels that belong to each module of list_modules(). A module without labels of its own is not listed: the iterated
-/// projection repeats the fractional step's kernels, and files are written by the host.
+/// Labels that belong to each module of list_modules(). A module without labels of its own is not listed: files
+/// are written by the host.
 const std::map<std::string, std::vector<std::string>> labels_of = {
     {"fluid", {"corpuscle::fluid::", "corpuscle::multigrid::", "corpuscle::grid::"}},
     {"convection", {"corpuscle::fluid::convection", "corpuscle::fluid::flux_old", "corpuscle::fluid::flux_extrapolated"}},
@@ -114,7 +114,63 @@ void check_flow(const std::string& name, std::vector<std::string> overrides) {
   }
 }
 
+/// Kernels of the fourth step and bytes allocated up to then, of labels that begin with one of `prefixes`.
+struct Price {
+  int kernels = 0;
+  double megabytes = 0;
+};
+
+Price price(const Case& scene, const std::vector<std::string>& prefixes) {
+  Price price;
+  Recorder recorder;
+  recorder.start();
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  for (int n = 0; n < 3; ++n) simulation.step();
+  recorder.stop();
+  for (const auto& prefix : prefixes) price.megabytes += 1e-6 * Recorder::matching(Recorder::bytes(), prefix);
+  recorder.start();
+  simulation.step();
+  recorder.stop();
+  for (const auto& prefix : prefixes) price.kernels += Recorder::matching(Recorder::kernels(), prefix);
+  return price;
+}
+
+Case small(const std::string& name, std::vector<std::string> overrides) {
+  overrides.insert(overrides.end(), {"grid.nodes=[17,17,25]", "time.step_us=1", "time.end_us=20"});
+  return read_case(case_file(name), overrides);
+}
+
 }  // namespace
+
+TEST_CASE("what is left out would have cost what the program says", "[needless]") {
+  const auto check = [](const char* module, const std::vector<std::string>& labels, const Case& without,
+                        const Case& with) {
+    const ModuleCost said = list_modules(without, 1).cost.at(module);
+    const Price less = price(without, labels), more = price(with, labels);
+    INFO(module << ": " << more.kernels - less.kernels << " kernels, " << more.megabytes - less.megabytes << " MB");
+    CHECK(more.kernels - less.kernels == said.kernels);
+    CHECK(more.megabytes - less.megabytes == Approx(said.megabytes).epsilon(0.01));
+  };
+  check("convection", {"corpuscle::fluid::convection", "corpuscle::fluid::extrapolate", "corpuscle::fluid::flux_"},
+        small("tube_flow", {"fluid.convection=false"}), small("tube_flow", {}));
+  check("membrane viscosity", {"corpuscle::membrane::"},
+        small("straight_tube", {"cells.0.membrane_viscosity_N_s_per_m=0"}), small("straight_tube", {}));
+
+  Case sphere = small("tube_flow", {});
+  sphere.bodies.emplace_back();
+  sphere.bodies[0].radius_um = 2;
+  sphere.bodies[0].velocity_um_per_us = {0, 0, 1e-3};
+  const Case tube = small("tube_flow", {});
+  const ModuleCost least = list_modules(tube, 1).cost.at("immersed search");
+  const Price search = price(sphere, {"corpuscle::immersed::"});
+  const int repeated = Recorder::matching(Recorder::kernels(), "corpuscle::immersed::apply_velocity_rows");
+  INFO("a sphere: " << search.kernels - repeated << " kernels, " << search.megabytes << " MB");
+  CHECK(search.kernels - repeated >= least.kernels);
+  CHECK(search.kernels - repeated < 1.3 * least.kernels);
+  CHECK(search.megabytes >= least.megabytes);
+  CHECK(search.megabytes < 2 * least.megabytes);
+}
 
 TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothing new in a step", "[needless]") {
   const std::string tube = "grid.nodes=[17,17,25]";

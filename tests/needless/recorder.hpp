@@ -14,6 +14,7 @@ class Recorder {
   void start() {
     kernels().clear();
     allocations().clear();
+    bytes().clear();
     namespace hooks = Kokkos::Tools::Experimental;
     hooks::set_begin_parallel_for_callback(launch);
     hooks::set_begin_parallel_reduce_callback(launch);
@@ -38,6 +39,12 @@ class Recorder {
     return counts;
   }
 
+  /// Bytes allocated by view label.
+  static std::map<std::string, int>& bytes() {
+    static std::map<std::string, int> counts;
+    return counts;
+  }
+
   /// How many of `counts` have a label that begins with `prefix`.
   static int matching(const std::map<std::string, int>& counts, const std::string& prefix) {
     int sum = 0;
@@ -48,8 +55,9 @@ class Recorder {
 
  private:
   static void launch(const char* label, std::uint32_t, std::uint64_t*) { ++kernels()[label]; }
-  static void allocate(Kokkos::Tools::SpaceHandle, const char* label, const void*, std::uint64_t) {
+  static void allocate(Kokkos::Tools::SpaceHandle, const char* label, const void*, std::uint64_t size) {
     ++allocations()[label];
+    bytes()[label] += static_cast<int>(size);
   }
 };
 

@@ -9,16 +9,13 @@
 using namespace corpuscle;
 using namespace corpuscle::manufactured;
 using Convection = FluidSettings::Convection;
-using Projection = FluidSettings::Projection;
 
 namespace {
 
-FluidSettings settings_of(Convection convection, Projection projection) {
+FluidSettings settings_of(Convection convection) {
   FluidSettings s;
   s.convection = convection;
-  s.projection = projection;
   s.momentum_tolerance = 1e-9;
-  s.projection_max_iterations = 100;
   return s;
 }
 
@@ -28,7 +25,7 @@ void show(const std::string& text) {
 
 std::string name(const FluidSettings& s) {
   return fmt::format(
-      "{}, convection {}", s.projection == Projection::iterated ? "iterated" : "fractional step",
+      "convection {}",
       s.convection == Convection::none ? "none" : (s.convection == Convection::implicit ? "implicit" : "extrapolated"));
 }
 
@@ -36,8 +33,7 @@ std::string name(const FluidSettings& s) {
 
 TEST_CASE("the manufactured flow converges in space on a skewed grid", "[verification]") {
   const Comm comm;
-  const FluidSettings s = settings_of(GENERATE(Convection::extrapolated, Convection::implicit, Convection::none),
-                                      GENERATE(Projection::fractional_step, Projection::iterated));
+  const FluidSettings s = settings_of(GENERATE(Convection::extrapolated, Convection::implicit, Convection::none));
   std::vector<double> spacing, velocity, pressure;
   for (int n : {12, 16, 24}) {
     // The step shrinks with the spacing, so that the error in time falls at second order as well.
@@ -55,9 +51,7 @@ TEST_CASE("the manufactured flow converges in space on a skewed grid", "[verific
 
 TEST_CASE("the manufactured flow converges in time", "[verification]") {
   const Comm comm;
-  FluidSettings s = settings_of(GENERATE(Convection::extrapolated, Convection::implicit, Convection::none),
-                                GENERATE(Projection::fractional_step, Projection::iterated));
-  s.projection_tolerance = 1e-8;
+  FluidSettings s = settings_of(GENERATE(Convection::extrapolated, Convection::implicit, Convection::none));
   Flow flow;
   flow.from_rest = true;
   const double end = 0.8;
@@ -78,27 +72,4 @@ TEST_CASE("the manufactured flow converges in time", "[verification]") {
   CHECK(fitted_order(step, pressure) >= 1.5);
   CHECK(velocity.back() < 6e-4);  // measured 4.4e-4 to 4.7e-4; (rate dt)^2 is 2.5e-3
   CHECK(pressure.back() < 8e-3);  // the convective terms' extrapolation is most of it: measured 1.4e-3 to 4.8e-3
-}
-
-TEST_CASE("iterating the projection removes the splitting error of viscous flow", "[verification]") {
-  // Viscous number nu dt / h^2 = 12.5, as in a 31 x 31 x 51 tube with steps of 1 us.
-  const Comm comm;
-  Flow flow;
-  flow.mu = 10;
-  flow.from_rest = true;
-  const NodeSource source = skewed_cube(10);
-  double split[2] = {0, 0}, total = 0;
-  for (const auto projection : {Projection::fractional_step, Projection::iterated}) {
-    FluidSettings s = settings_of(Convection::extrapolated, projection);
-    s.projection_tolerance = 1e-8;
-    Fields reference, fields;
-    run(comm, source, 0.8 / 128, 128, s, &reference, flow);
-    total = run(comm, source, 0.8 / 16, 16, s, &fields, flow).velocity;
-    split[projection == Projection::iterated] = difference(comm, source, fields, reference).velocity;
-  }
-  show(fmt::format("error in time {:.2e} with one pass, {:.2e} iterated; with the error in space {:.2e}", split[0],
-                   split[1], total));
-  CHECK(split[0] < 4e-4);            // measured 2.9e-4: below a tenth of the error in space of this grid
-  CHECK(split[1] < 0.2 * split[0]);  // measured 2.0e-5
-  CHECK(total > 5 * split[0]);
 }

@@ -1,0 +1,121 @@
+#include "app/error_estimate.hpp"
+
+#include "core/error.hpp"
+#include "core/log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <string_view>
+
+namespace corpuscle {
+
+namespace {
+
+constexpr int fewest_vertices = 200;  // of a built-in mesh
+
+[[noreturn]] void refuse(std::string_view kind, std::string_view why) {
+  throw InputError(fmt::format("--estimate-error={}: {}", kind, why));
+}
+
+CoarserRun doubled_spacing(const Case& scene) {
+  if (!scene.grid) refuse("spacing", "this scene has no grid; use --estimate-error=vertices");
+  if (scene.grid->generator == GridSettings::Generator::file)
+    refuse("spacing", "a grid from a file cannot be coarsened; use --estimate-error=step");
+  std::array<int, 3> nodes{};
+  double ratio = 2;
+  for (int d = 0; d < 3; ++d) {
+    const int cells = scene.grid->nodes[d] - 1;
+    nodes[d] = std::max(3, (cells + 1) / 2) + 1;
+    if (nodes[d] < scene.grid->nodes[d]) ratio = std::min(ratio, double(cells) / (nodes[d] - 1));
+  }
+  if (nodes == scene.grid->nodes) refuse("spacing", "the grid has no more than the 4 nodes that are needed");
+  CoarserRun run{"spacing", ratio, {}};
+  run.overrides.push_back(fmt::format("grid.nodes=[{},{},{}]", nodes[0], nodes[1], nodes[2]));
+  return run;
+}
+
+CoarserRun longer_step(const Case& scene) {
+  if (!scene.fluid) refuse("step", "this scene has no time; use --estimate-error=vertices");
+  const long steps = std::lround(scene.time.end_us / scene.time.step_us);
+  long ratio = 2;
+  while (ratio <= steps && steps % ratio != 0) ++ratio;
+  if (ratio > steps) refuse("step", "the run is a single step");
+  CoarserRun run{"step", double(ratio), {}};
+  run.overrides.push_back(fmt::format("time.step_us={:.15g}", scene.time.step_us * ratio));
+  return run;
+}
+
+CoarserRun fewer_vertices(const Case& scene) {
+  if (scene.cells.empty()) refuse("vertices", "this scene has no [[cells]]; use --estimate-error=spacing,step");
+  CoarserRun run{"vertices", std::sqrt(2.0), {}};
+  for (std::size_t c = 0; c < scene.cells.size(); ++c) {
+    const auto& cell = scene.cells[c];
+    if (!cell.mesh.empty()) refuse("vertices", fmt::format("cells.{} comes from a file and cannot be coarsened", c));
+    const int vertices = std::max(cell.vertices / 2, fewest_vertices);
+    if (vertices >= cell.vertices)
+      refuse("vertices", fmt::format("cells.{}.vertices = {}: no mesh is coarser; raise it", c, cell.vertices));
+    run.ratio = std::min(run.ratio, std::sqrt(double(cell.vertices) / vertices));
+    run.overrides.push_back(fmt::format("cells.{}.vertices={}", c, vertices));
+  }
+  return run;
+}
+
+}  // namespace
+
+std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds) {
+  std::vector<CoarserRun> runs;
+  if (kinds == "all") {
+    if (scene.grid && scene.grid->generator != GridSettings::Generator::file) runs.push_back(doubled_spacing(scene));
+    if (scene.fluid) runs.push_back(longer_step(scene));
+    const bool coarser_meshes = std::all_of(scene.cells.begin(), scene.cells.end(), [](const CellSettings& cell) {
+      return cell.mesh.empty() && cell.vertices > fewest_vertices;
+    });
+    if (!scene.cells.empty() && coarser_meshes) runs.push_back(fewer_vertices(scene));
+    if (runs.empty()) refuse("all", "nothing of this scene can be coarsened");
+    return runs;
+  }
+  std::stringstream list(kinds);
+  for (std::string kind; std::getline(list, kind, ',');) {
+    if (kind == "spacing") {
+      runs.push_back(doubled_spacing(scene));
+    } else if (kind == "step") {
+      runs.push_back(longer_step(scene));
+    } else if (kind == "vertices") {
+      runs.push_back(fewer_vertices(scene));
+    } else {
+      refuse(kind, "unknown; use spacing, step, vertices (comma-separated) or all");
+    }
+  }
+  return runs;
+}
+
+void add_error_bars(Report& report, const CoarserRun& run, const Report& coarser) {
+  for (const auto& [name, value] : report.quantities) {
+    const auto other = coarser.quantities.find(name);
+    if (other == coarser.quantities.end()) continue;
+    report.error_bars[name] += std::abs(value - other->second) / (run.ratio - 1);
+  }
+  nlohmann::json entry;
+  entry["coarser"] = run.kind;
+  entry["ratio"] = run.ratio;
+  entry["quantities"] = coarser.quantities;
+  entry["wall_s"] = coarser.wall_s;
+  report.extra["error_estimate"].push_back(entry);
+}
+
+void print_quantities(const Report& report) {
+  constexpr std::size_t most = 12;  // more are in the report
+  std::size_t shown = 0;
+  for (const auto& [name, value] : report.quantities) {
+    if (++shown > most) {
+      info("  ... and {} more in report.json", report.quantities.size() - most);
+      return;
+    }
+    const auto bar = report.error_bars.find(name);
+    info("  {:<34} {:.6g}{}", name, value,
+         bar == report.error_bars.end() ? std::string() : fmt::format(" +- {:.2g}", bar->second));
+  }
+}
+
+}  // namespace corpuscle

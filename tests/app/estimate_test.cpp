@@ -1,0 +1,81 @@
+// Error bars from coarser runs, and the cost of starting up.
+#include <chrono>
+#include <cmath>
+
+#include "program.hpp"
+
+using namespace app;
+using Catch::Contains;
+
+namespace {
+
+/// `wanted` lies within the report's bar of the report's value.
+void require_within_bar(const nlohmann::json& r, const std::string& name, double wanted) {
+  const double value = r["quantities"][name], bar = r["error_bars"][name];
+  INFO(name << ": " << value << " +- " << bar << ", finer: " << wanted);
+  REQUIRE(std::abs(value - wanted) <= bar);
+  REQUIRE(bar < 0.2 * std::abs(wanted));
+}
+
+}  // namespace
+
+TEST_CASE("error bars of a flow hold the finer answer") {
+  const auto folder = fresh_folder("bars_of_flow");
+  const Words coarse{"grid.nodes=[13,13,21]", "time.step_us=2", "output.fields=false"};
+  const Words fine{"grid.nodes=[25,25,41]", "time.step_us=1", "output.fields=false"};
+  const auto outcome = succeed(folder, with({"run", scene("tube_flow"), "--out", "coarse", "--estimate-error"}, coarse));
+  REQUIRE_THAT(outcome.output, Contains("+-") && Contains("grid.nodes=[7,7,11]") && Contains("time.step_us=4"));
+  succeed(folder, with({"run", scene("tube_flow"), "--out", "fine"}, fine));
+  const auto r = report(folder / "coarse");
+  REQUIRE(r["error_estimate"].size() == 2);
+  require_within_bar(r, "driving_pressure_Pa", report(folder / "fine")["quantities"]["driving_pressure_Pa"]);
+  REQUIRE(fs::exists(folder / "coarse/coarser_step/report.json"));
+}
+
+TEST_CASE("error bars of a stretched cell hold the finer answer") {
+  const auto folder = fresh_folder("bars_of_stretch");
+  const Words steps{"stretching.steps=2"};
+  succeed(folder, with(with({"run", scene("stretch"), "--out", "coarse", "--estimate-error=vertices"}, steps),
+                       {"cells.0.vertices=600"}));
+  succeed(folder, with(with({"run", scene("stretch"), "--out", "fine"}, steps), {"cells.0.vertices=1200"}));
+  const auto fine = report(folder / "fine")["quantities"];
+  for (const char* name : {"axial_um", "transverse_um"}) require_within_bar(report(folder / "coarse"), name, fine[name]);
+}
+
+TEST_CASE("a coarser run that fails costs the error bars, not the run") {
+  const auto folder = fresh_folder("bars_that_fail");
+  // 1.1 um from the wall: more than one spacing of the case's grid, less than one of the coarser.
+  const auto outcome = succeed(folder, with({"run", scene("straight_tube"), "--out", "out", "--estimate-error=spacing"},
+                                            {"grid.nodes=[21,21,33]", "time.end_us=4", "cells.0.center_um=[0.3,0,0]"}));
+  REQUIRE_THAT(outcome.output, Contains("no error bars from spacing") && Contains("gap to the wall"));
+  const auto r = report(folder / "out");
+  REQUIRE(r["error_estimate"][0]["failed"].get<std::string>().size() > 10);
+  REQUIRE_FALSE(r.contains("error_bars"));
+}
+
+TEST_CASE("estimates that cannot be made are refused") {
+  const auto folder = fresh_folder("bars_refused");
+  fail(folder, {"run", scene("tube_flow"), "--estimate-error=mesh"}, 2, {"--estimate-error=mesh", "spacing, step, vertices"});
+  fail(folder, {"run", scene("tube_flow"), "--estimate-error=vertices"}, 2, {"no [[cells]]", "spacing,step"});
+  fail(folder, {"run", scene("stretch"), "--estimate-error=step"}, 2, {"has no time", "vertices"});
+  fail(folder, with({"run", scene("stretch"), "--estimate-error=vertices"}, {"cells.0.vertices=200"}), 2,
+       {"no mesh is coarser"});
+  fail(folder, {"run", scene("tube_flow"), "--estimate-error", "--restart", "checkpoint.h5"}, 2, {"leave out --restart"});
+}
+
+TEST_CASE("stretching starts at once and takes little memory") {
+  const auto folder = fresh_folder("start_up");
+  double fastest = 1e30;  // of several: other work on the machine is not this program's
+  for (int n = 0; n < 5; ++n) {
+    const auto before = std::chrono::steady_clock::now();
+    succeed(folder, {"check", scene("stretch")});
+    fastest = std::min(fastest, std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count());
+  }
+  // check does everything that comes before the first relaxation. Optimised builds only.
+#ifdef NDEBUG
+  CHECK(fastest < 0.2);
+#endif
+  INFO("start-up in " << fastest << " s");
+  succeed(folder, {"run", scene("stretch"), "--out", "out"});
+  CHECK(report(folder / "out")["peak_rss_mb"].get<double>() < 100);
+}
