@@ -51,7 +51,7 @@ class PlainTube(Problem):
                 + (["61x61x101", "81x81x134"] if self.full else []),
                 "step_us": [8, 4, 2, 1, 0.5] + ([0.25] if self.full else []),
                 "cross_section": ["elliptical", "conformal"],
-                "convection": [False, True, "implicit"], "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8],
+                "convection": [False, True, "implicit"], "momentum_tolerance": [1e-3, 1e-4, 1e-5, 1e-6, 1e-8],
                 "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
     def combinations(self):
@@ -122,7 +122,7 @@ class SphereArray(Problem):
         return {"nodes_per_diameter": [6, 8, 12, 16, 24] + ([32, 48] if self.full else []),
                 "step_us": [30, 10, 3],
                 "body_vertices": [100, 300, "from spacing (0)", 1200, 3000],
-                "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8],
+                "momentum_tolerance": [1e-3, 1e-4, 1e-5, 1e-6, 1e-8],
                 "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
     def combinations(self):
@@ -162,7 +162,7 @@ class MovingSphere(Problem):
     def sweeps(self):
         return {"nodes_per_diameter": [8, 12, 16] + ([24, 32] if self.full else [24]), "step_us": [4, 2, 1, 0.5],
                 "body_vertices": [200, "from spacing (0)", 2000],
-                "momentum_tolerance": [1e-3, 1e-4, 1e-6, 1e-8], "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
+                "momentum_tolerance": [1e-3, 1e-4, 1e-5, 1e-6, 1e-8], "divergence_tolerance": [1e-6, 1e-8, 5e-11]}
 
     def combinations(self):
         return [{"nodes_per_diameter": 16, "step_us": 4}]
@@ -298,7 +298,7 @@ class CellInTube(Problem):
                 "scheme": [{"scheme": "loose"}, {}] + aitken,
                 "robin_coefficient": [30, 20, "pi mu / h", 10] if self.full else [20, "pi mu / h", 10],
                 "convection": [False, True] + (["implicit"] if self.full else []),
-                "momentum_tolerance": ([1e-2] if self.full else []) + [1e-3, 1e-4, 1e-6] + ([1e-8] if self.full else []),
+                "momentum_tolerance": ([1e-2] if self.full else []) + [1e-3, 1e-4, 1e-5, 1e-6] + ([1e-8] if self.full else []),
                 "divergence_tolerance": [1e-6] + ([1e-8] if self.full else []) + [5e-11]}
 
     def combinations(self):

@@ -4,6 +4,7 @@
 #include <Kokkos_Core.hpp>
 
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 
 #ifdef CORPUSCLE_MPI
@@ -19,6 +20,7 @@ int run_program(int argc, char** argv, int words, const char* usage, const Body&
     std::fprintf(stderr, "usage: %s %s\n", argv[0], usage);
     return 2;
   }
+  setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
 #ifdef CORPUSCLE_MPI
   MPI_Init(&argc, &argv);
 #endif

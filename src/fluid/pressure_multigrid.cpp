@@ -18,13 +18,22 @@ constexpr double strong = 0.4;
 constexpr int smallest_block = 2 * IndexSpace::halo;  // along a direction that is cut over ranks or periodic
 constexpr double coarsest_cells = 300;
 
+template <class Real>
+void allocate(const IndexSpace& index, LevelOperator<Real>& level) {
+  level.index = index;
+  for (auto& g : level.conductance) g = Array<Real>("corpuscle::multigrid::conductance", index.size());
+  level.diagonal = Array<Real>("corpuscle::multigrid::diagonal", index.size());
+  level.inverse = Array<Real>("corpuscle::multigrid::inverse", index.size());
+}
+
 MultigridLevel make_level(const IndexSpace& index) {
   MultigridLevel level;
-  level.index = index;
-  for (auto& g : level.conductance) g = Array<double>("corpuscle::multigrid::conductance", index.size());
-  level.diagonal = Array<double>("corpuscle::multigrid::diagonal", index.size());
-  level.inverse = Array<double>("corpuscle::multigrid::inverse", index.size());
+  allocate(index, level);
   return level;
+}
+
+Array<CycleReal> cycle_vector(const IndexSpace& index) {
+  return Array<CycleReal>("corpuscle::multigrid::cycle_vector", index.size());
 }
 
 }  // namespace
@@ -33,16 +42,17 @@ PressureMultigrid::PressureMultigrid(Grid& grid, const Array<double> (&coefficie
     : grid_(&grid), max_iterations_(max_iterations) {
   const IndexSpace& index = grid.index();
   for (int d = 0; d < 3; ++d) coefficient_[d] = coefficient[d];
-  const auto vector = [](const IndexSpace& i) { return Array<double>("corpuscle::multigrid::vector", i.size()); };
-  levels_.push_back({make_level(index), Halo(grid.comm(), index, grid.ranks_per_direction()), vector(index),
-                     vector(index), vector(index)});
-  p_ = vector(index), q_ = vector(index);
+  levels_.push_back({make_level(index), Halo(grid.comm(), index, grid.ranks_per_direction()), cycle_vector(index),
+                     cycle_vector(index), cycle_vector(index)});
+  for (auto* vector : {&p_, &q_, &r_}) *vector = Array<double>("corpuscle::multigrid::vector", index.size());
+  allocate(index, operator_);
   auto& finest = levels_[0].views;
   for (int d = 0; d < 3; ++d)
     for (int side = 0; side < 2; ++side) finest.open[d][side] = grid.halo().neighbour(d, side) >= 0;
   const PressureMask everywhere("corpuscle::multigrid::mask", index.size());
   Kokkos::deep_copy(everywhere, 1);
-  mask_conductances(coefficient_, everywhere, finest);
+  mask_conductances(coefficient_, everywhere, operator_);
+  round_operator(operator_, finest);
   while (add_coarser()) {
   }
   Level& last = levels_.back();
@@ -82,8 +92,8 @@ bool PressureMultigrid::add_coarser() {
   MultigridLevel views = make_level(index);
   std::copy(&fine.views.open[0][0], &fine.views.open[0][0] + 6, &views.open[0][0]);
   coarsen_conductances(fine.views, views);
-  const auto vector = [&] { return Array<double>("corpuscle::multigrid::vector", index.size()); };
-  levels_.push_back({views, Halo(comm, index, grid_->ranks_per_direction()), vector(), vector(), vector()});
+  levels_.push_back({views, Halo(comm, index, grid_->ranks_per_direction()), cycle_vector(index), cycle_vector(index),
+                     cycle_vector(index)});
   return true;
 }
 
@@ -94,17 +104,22 @@ std::vector<int> PressureMultigrid::cells() const {
 }
 
 void PressureMultigrid::update(const PressureMask& mask, int pinned) {
-  mask_conductances(coefficient_, mask, levels_[0].views);
+  mask_conductances(coefficient_, mask, operator_);
+  level_diagonals(operator_, -1, 0.0);
   double extra = 0;
+  if (pinned >= 0) {  // the extra is as large as the diagonal itself
+    Kokkos::deep_copy(extra, Kokkos::subview(operator_.diagonal, pinned));
+    level_diagonals(operator_, pinned, extra);
+  }
+  grid_->halo().exchange(operator_.inverse);
+  round_operator(operator_, levels_[0].views);
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     auto& views = levels_[l].views;
-    if (l > 0) coarsen_conductances(levels_[l - 1].views, views);
-    if (pinned >= 0 && l == 0) {  // the extra is as large as the diagonal itself
-      level_diagonals(views, -1, 0);
-      Kokkos::deep_copy(extra, Kokkos::subview(views.diagonal, pinned));
+    if (l > 0) {
+      coarsen_conductances(levels_[l - 1].views, views);
+      level_diagonals(views, pinned, static_cast<CycleReal>(extra));
+      levels_[l].halo.exchange(views.inverse);
     }
-    level_diagonals(views, pinned, extra);
-    levels_[l].halo.exchange(views.inverse);
     if (pinned >= 0 && l + 1 < levels_.size()) {
       int at[3];
       views.index.unpack(pinned, at[0], at[1], at[2]);
@@ -120,7 +135,7 @@ void PressureMultigrid::update(const PressureMask& mask, int pinned) {
 void PressureMultigrid::solve_coarsest(Level& level) {
   compact_scalar(level.views.index, level.b, coarse_rhs_);
   coarsest_->cycle(coarse_rhs_, coarse_x_);
-  scalar_from_compact(level.views.index, coarse_x_, level.x);
+  spread_scalar(level.views.index, 1, coarse_x_, level.x);
 }
 
 /// x = one V-cycle for b on a level and all below it.
@@ -139,7 +154,7 @@ void PressureMultigrid::cycle(std::size_t number) {
   }
   level.halo.exchange(level.x);
   Level& coarse = levels_[number + 1];
-  restrict_residual(views, coarse.views.index, level.b, level.x, coarse.b);
+  restrict_residual(views, coarse.views.index, level.b, level.x, level.y, coarse.b);
   cycle(number + 1);
   add_correction(views, coarse.views.index, coarse.x, level.x);
   ChebyshevSteps after(smoothed_from, smoothed_to);
@@ -155,22 +170,29 @@ KrylovResult PressureMultigrid::solve(const Array<double>& rhs, const Array<doub
   const Comm& comm = grid_->comm();
   Level& finest = levels_[0];
   const IndexSpace& index = finest.views.index;
-  const Array<double>& r = finest.b;  // the preconditioner's right-hand side is the residual
-  scalar_from_compact(index, rhs, r);
+  scalar_from_compact(index, rhs, r_);
   Kokkos::deep_copy(Exec(), x, 0.0);
   KrylovResult result;
-  double norm = std::sqrt(comm.sum(owned_dot(index, r, r)));
+  double norm = std::sqrt(comm.sum(owned_dot(index, r_, r_)));
   result.residual = norm;
+  if (!(norm > 0) || !std::isfinite(norm)) {
+    result.converged = norm == 0;
+    return result;
+  }
+  // The cycle sees residuals of order one: single precision has no room for very small ones.
+  double scale = 1 / norm;
+  spread_scalar(index, scale, rhs, finest.b);
   const double tolerance = std::max(absolute_tolerance, least_reduction * norm);
   double rz = 1;
   while (norm > tolerance && result.iterations < max_iterations_ && std::isfinite(norm)) {
     cycle(0);
-    const double next = comm.sum(owned_dot(index, r, finest.x));
-    new_direction(index, result.iterations == 0 ? 0.0 : next / rz, finest.x, p_);
+    const double next = comm.sum(owned_dot(index, r_, finest.x)) / scale;
+    new_direction(index, result.iterations == 0 ? 0.0 : next / rz, 1 / scale, finest.x, p_);
     rz = next;
     finest.halo.exchange(p_);
-    const double alpha = rz / comm.sum(apply_and_dot(finest.views, p_, q_));
-    norm = std::sqrt(comm.sum(advance_and_norm(index, alpha, p_, q_, x, r)));
+    const double alpha = rz / comm.sum(apply_and_dot(operator_, p_, q_));
+    scale = 1 / norm;
+    norm = std::sqrt(comm.sum(advance_and_norm(index, alpha, scale, p_, q_, x, r_, finest.b)));
     ++result.iterations;
   }
   result.converged = norm <= tolerance;

@@ -1,5 +1,5 @@
 // The pressure equation of an orthogonal grid, matrix-free: conjugate gradients preconditioned by a geometric multigrid
-// cycle, whose coarsest level is left to BoomerAMG.
+// cycle in single precision, whose coarsest level is left to BoomerAMG.
 #pragma once
 
 #include "fluid/multigrid.hpp"
@@ -30,7 +30,7 @@ class PressureMultigrid {
   struct Level {
     MultigridLevel views;
     Halo halo;
-    Array<double> b, x, y;
+    Array<CycleReal> b, x, y;
   };
   bool add_coarser();
   void cycle(std::size_t number);
@@ -42,7 +42,8 @@ class PressureMultigrid {
   std::vector<Level> levels_;
   std::unique_ptr<PressureSolver> coarsest_;
   Array<double> coarse_rhs_, coarse_x_;
-  Array<double> p_, q_;
+  LevelOperator<double> operator_;
+  Array<double> p_, q_, r_;
 };
 
 }  // namespace corpuscle

@@ -47,7 +47,7 @@ struct FluidSettings {
   double density_pg_per_um3 = 1.0;
   double kinematic_viscosity_um2_per_us = 1.1;
   Convection convection = Convection::extrapolated;
-  double momentum_tolerance = 1e-6;     // relative residual; 1e-5 moves a cell by 1e-5 um in 400 us, 1e-6 by less
+  double momentum_tolerance = 1e-6;     // relative residual; 1e-5 moves a cell by less than 1e-5 um in 300 us
   double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
   int max_iterations = 2000;            // of either linear solver
   Triple pressure_gradient_Pa_per_um{}; // imposed on periodic directions, in Pa/um; drives the flow along -gradient
