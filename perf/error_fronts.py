@@ -92,7 +92,7 @@ def cheapest_table(problems, rows_of):
 def cheapest(problem, rows, column, target):
     good = [r for r in rows if r[column] <= target]
     if not rows:
-        return problem.unavailable().split(":")[0] or "no run finished"
+        return "no run finished"
     if not good:
         return f"not reached: at best {min(r[column] for r in rows):.2g} %"
     best = min(good, key=lambda r: r["time_s"])
@@ -159,8 +159,8 @@ def limits(problem, rows, column):
 
 def paragraph(problem, rows):
     text = f"### {problem.title}\n\n{problem.what}\n\n"
-    if missing := problem.unavailable():
-        return text + f"**{missing}**\n"
+    if not rows:
+        return text + "No run finished.\n"
     text += "\n".join("- " + limits(problem, rows, column) for column in problem.errors if points(rows, column)) + "\n"
     for kind, label in (("better", "Better than the default"), ("dominated", "Dominated by the default")):
         found = [d for p, _, d, s in judge([problem], {problem.name: rows}) if s == kind]

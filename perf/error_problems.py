@@ -247,11 +247,6 @@ class PushedMembrane(ExternalProblem):
     errors = {"extent_error_pc": "extents"}
     default = {"vertices": 500, "mass_pg": 100, "membrane_viscosity_N_s_per_m": 5.8e-9, "membrane_step_us": 0.5}
 
-    def unavailable(self):
-        missing = super().unavailable()
-        return missing and (missing + "; the input has no key for the membrane's sub-step (the program chooses it from the "
-                            "stiffness) and no case without [fluid] or [stretching] is accepted")
-
     def sweeps(self):
         return {"membrane_step_us": [1, 0.5, 0.25, 0.125, 0.0625], "vertices": [500, 1000],
                 "membrane_viscosity_N_s_per_m": [0, 5.8e-9]}

@@ -54,9 +54,6 @@ class Problem:
     def references(self):
         return []
 
-    def unavailable(self):
-        return ""
-
     def plan(self, cores):
         plans = [Plan(self.default, "default")]
         sweeps = self.sweeps()
@@ -99,17 +96,11 @@ class ExternalProblem(Problem):
     """A small program of its own that prints one JSON line; the case file cannot express the problem."""
     program = ""
 
-    def path(self):
-        return study.ROOT / "build/openmp/perf" / self.program
-
-    def unavailable(self):
-        return "" if self.path().exists() else f"not built: {self.path().relative_to(study.ROOT)}"
-
     def arguments(self, settings):
         return []
 
     def simulate(self, settings, folder, timeout_s):
-        command = [str(self.path()), *(str(a) for a in self.arguments(settings))]
+        command = [str(study.study_program(self.program)), *(str(a) for a in self.arguments(settings))]
         try:
             result = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s)
         except subprocess.TimeoutExpired:

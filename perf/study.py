@@ -2,6 +2,7 @@
 import csv
 import dataclasses
 import datetime
+import importlib.util
 import json
 import os
 import pathlib
@@ -15,11 +16,29 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "perf" / "results"
 
 
+def need(*modules):
+    """End with what to do if this Python lacks one of them."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        sys.exit(f"{sys.executable} has no {', '.join(missing)}: setup.sh installs what is needed for the system's Python, "
+                 f"so put /usr/bin first in PATH; or: {sys.executable} -m pip install {' '.join(missing)}")
+
+
 def program():
     """The program to study: CORPUSCLE, or the one that setup.sh built."""
     path = pathlib.Path(os.environ.get("CORPUSCLE", ROOT / "build/openmp/corpuscle"))
     if not path.exists():
         sys.exit(f"{path} does not exist: run ./setup.sh first, or set CORPUSCLE")
+    return path
+
+
+def study_program(name):
+    """One of this folder's own programs, built beside the one to study if it is not there yet (half a minute)."""
+    path = program().parent / "perf" / name
+    if not path.exists():
+        built = subprocess.run(["cmake", "--build", program().parent, "--target", name], capture_output=True, text=True)
+        if built.returncode or not path.exists():
+            sys.exit(f"{path} does not exist and cannot be built:\n{(built.stdout + built.stderr)[-2000:]}")
     return path
 
 
