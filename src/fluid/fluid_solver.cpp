@@ -266,7 +266,7 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   const double residual = momentum_residual();
   if (!std::isfinite(residual))
     throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run, with convection "
-                           "most often a step longer than the flow takes across a cell; reduce time.step_us, or set "
+                           "most often a step too long, longer than the flow takes across a cell; reduce time.step_us, or set "
                            "fluid.convection = \"implicit\"");
   solve_momentum(bodies, residual);
   statistics_.reference_speed =
