@@ -10,6 +10,9 @@
 #include "output/text_file.hpp"
 
 namespace corpuscle {
+
+extern const char source_hash[];  // written by git_hash.cmake
+
 namespace {
 
 nlohmann::json to_json(const Tally& tally) {
@@ -33,7 +36,7 @@ std::vector<std::string> outputs_left_out(const OutputSettings& output) {
 }
 
 std::string git_hash() {
-  const std::string hash = CORPUSCLE_GIT;
+  const std::string hash = source_hash;
   return hash.empty() ? "unknown" : hash;
 }
 
