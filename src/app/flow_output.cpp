@@ -7,6 +7,8 @@
 #include "membrane/shape_measures.hpp"
 #include "output/owned_values.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace corpuscle {

@@ -22,6 +22,7 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;
   bodies_.growth = Array<double>("corpuscle::immersed::growth", surfaces.bodies);
+  mean_velocity_ = Table<double>("corpuscle::immersed::mean_velocity", surfaces.bodies, 3);
   traction_ = Components<double>("corpuscle::coupling::traction", surfaces.vertices, 3);
   traction_host_ = Kokkos::create_mirror_view(traction_);
 }
@@ -99,8 +100,9 @@ void ImmersedFlow::solve(double time) {
   {
     const auto scope = timers_.scope("search");
     boundary_->update_surface_velocity();
-    body_growth(surfaces_, bodies_.growth);
-    fill_inside_velocity(fluid_.grid().index(), surfaces_, boundary_->band(), boundary_->nodes(), fluid_.velocity());
+    body_growth(surfaces_, bodies_.growth, mean_velocity_);
+    fill_inside_velocity(fluid_.grid().index(), surfaces_, boundary_->band(), boundary_->nodes(), mean_velocity_,
+                         fluid_.velocity());
   }
   fluid_.solve(time, &bodies_);
 }

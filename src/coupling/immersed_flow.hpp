@@ -60,6 +60,7 @@ class ImmersedFlow {
   Timers& timers_;
   std::unique_ptr<ImmersedBoundary> boundary_;
   EmbeddedBodies bodies_;
+  Table<double> mean_velocity_;  // [body, 3] um/us
   Components<double> traction_;
   HostMirror<Components<double>> traction_host_;
   ImmersedReport report_;
