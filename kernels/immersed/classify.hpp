@@ -221,7 +221,7 @@ inline int reach_along(const IndexSpace& index, const NodeBox& box, int directio
 /// Fluid that a surface's folds close in, on the grid, has no pressure equation that could be solved: band nodes that no
 /// grid path joins to the faces of the box become immersed. @returns how many of them are owned.
 inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
-                            const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
+                          const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
   seed_faces(index, box, nodes, reached);
   int added = 1;
   while (added > 0) {

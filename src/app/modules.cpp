@@ -34,7 +34,6 @@ std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) 
     }
     return ModuleCost{3, (18 + 22) * 8 * vertices * 1e-6};
   }
-  if (module == "field output" && nodes) return ModuleCost{0, *nodes * 33 * 1e-6};
   return std::nullopt;
 }
 
@@ -70,8 +69,6 @@ void print_modules(const ModuleList& modules) {
     const auto cost = modules.cost.find(name);
     if (cost == modules.cost.end()) {
       left_out.push_back(name);
-    } else if (cost->second.kernels == 0) {
-      left_out.push_back(fmt::format("{} ({:.2g} MB)", name, cost->second.megabytes));
     } else {
       left_out.push_back(
           fmt::format("{} ({} kernels a step, {:.2g} MB)", name, cost->second.kernels, cost->second.megabytes));

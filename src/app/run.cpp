@@ -57,9 +57,8 @@ void print_end(const Report& report, const std::string& folder) {
   for (const auto& [name, value] : report.errors.items())
     if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
   info("errors:{}", errors);
-  const double lysis = FlowOutput::lysis_area;
   const auto drift = report.errors.find("area_drift");
-  if (drift != report.errors.end() && drift->is_number() && drift->get<double>() > lysis)
+  if (drift != report.errors.end() && drift->is_number() && drift->get<double>() > FlowOutput::lysis_area)
     warn("a cell's area changed by {:.0f} %: a real membrane breaks at about 4 %, so this load is beyond the model",
          100 * drift->get<double>());
   if (!report.quantities.empty()) info("at the end:");
