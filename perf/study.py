@@ -69,7 +69,9 @@ def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, o
     command = [str(program()), "run", str(path), "--out", str(folder), *options]
     for key, value in (overrides or {}).items():
         command += ["--set", f"{key}={toml(value)}"]
-    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), OMP_PROC_BIND="true" if ranks == 1 else "false")
+    # Threads that are bound would be bound to the same cores as those of other runs beside this one.
+    bound = "true" if ranks == 1 and threads > 1 else "false"
+    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), OMP_PROC_BIND=bound)
     if ranks > 1:
         environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         command = ["mpirun", "-n", str(ranks), "--oversubscribe"] + command
