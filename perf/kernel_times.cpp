@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <numeric>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -67,34 +68,55 @@ double triad(int entries, int passes) {
   return 24e-9 * entries / best;
 }
 
-/// Doubles that pass per cell (a float is half of one), and operations, of the streaming kernels. `levels`: runs on every multigrid level but the
-/// coarsest, once each.
+/// Where a kernel runs: on the grid, or once on each of these multigrid levels: all but the pressure's coarsest, those of the
+/// velocity, and those of the velocity but its coarsest.
+enum class Where { grid, pressure, velocity, velocity_above };
+
+/// Doubles that pass per cell (a float is half of one), and operations, of the streaming kernels.
 struct Definition {
   double doubles, operations;
-  bool levels;
+  Where where = Where::grid;
 };
 const std::map<std::string, Definition> definitions = {
-    {"corpuscle::fluid::momentum_step", {17, 75, false}},
-    {"corpuscle::fluid::momentum_residual", {11, 66, false}},
-    {"corpuscle::fluid::momentum_rhs", {12, 10, false}},
-    {"corpuscle::fluid::momentum_history", {13, 15, false}},
-    {"corpuscle::fluid::convection", {12, 60, false}},
-    {"corpuscle::fluid::pressure_gradient", {7, 90, false}},
-    {"corpuscle::fluid::face_flux", {17, 40, false}},
-    {"corpuscle::fluid::correct_flux", {4, 3, false}},
-    {"corpuscle::fluid::correct_velocity", {10, 95, false}},
-    {"corpuscle::fluid::update_pressure", {5, 6, false}},
-    {"corpuscle::fluid::divergence", {4, 6, false}},
-    {"corpuscle::multigrid::smooth", {4.5, 20, true}},
-    {"corpuscle::multigrid::smooth_from_zero", {3.5, 20, true}},
-    {"corpuscle::multigrid::residual", {4, 15, true}},
-    {"corpuscle::multigrid::restrict", {0.6, 1, true}},
-    {"corpuscle::multigrid::prolong", {2, 1, true}},
-    {"corpuscle::multigrid::operator", {6, 15, false}},
-    {"corpuscle::multigrid::advance", {6.5, 6, false}},
-    {"corpuscle::multigrid::dot", {1.5, 2, false}},
-    {"corpuscle::multigrid::direction", {2.5, 2, false}},
+    {"corpuscle::fluid::momentum_operator", {9, 75}},
+    {"corpuscle::fluid::momentum_residual", {16, 90}},
+    {"corpuscle::fluid::advance_velocity", {12.5, 22}},
+    {"corpuscle::fluid::scaled_dot", {3.5, 9}},
+    {"corpuscle::fluid::next_direction", {6, 12}},
+    {"corpuscle::fluid::momentum_history", {13, 15}},
+    {"corpuscle::fluid::convection", {12, 60}},
+    {"corpuscle::fluid::pressure_gradient", {7, 90}},
+    {"corpuscle::fluid::face_flux", {17, 40}},
+    {"corpuscle::fluid::correct_flux", {4, 3}},
+    {"corpuscle::fluid::correct_velocity", {10, 95}},
+    {"corpuscle::fluid::update_pressure", {5, 6}},
+    {"corpuscle::fluid::divergence", {4, 6}},
+    {"corpuscle::velocity_multigrid::smooth", {8.5, 60, Where::velocity}},
+    {"corpuscle::velocity_multigrid::smooth_from_zero", {6.5, 60, Where::velocity}},
+    {"corpuscle::velocity_multigrid::residual", {7, 45, Where::velocity_above}},
+    {"corpuscle::velocity_multigrid::restrict", {1.8, 3, Where::velocity_above}},
+    {"corpuscle::velocity_multigrid::prolong", {4, 3, Where::velocity_above}},
+    {"corpuscle::multigrid::smooth", {4.5, 20, Where::pressure}},
+    {"corpuscle::multigrid::smooth_from_zero", {3.5, 20, Where::pressure}},
+    {"corpuscle::multigrid::residual", {4, 15, Where::pressure}},
+    {"corpuscle::multigrid::restrict", {0.6, 1, Where::pressure}},
+    {"corpuscle::multigrid::prolong", {2, 1, Where::pressure}},
+    {"corpuscle::multigrid::operator", {6, 15}},
+    {"corpuscle::multigrid::advance", {6.5, 6}},
+    {"corpuscle::multigrid::dot", {1.5, 2}},
+    {"corpuscle::multigrid::direction", {2.5, 2}},
 };
+
+/// Mean number of cells that a launch there passes over.
+double cells_of(const FluidSolver& fluid, Where where) {
+  const auto cells = fluid.multigrid_cells();
+  std::size_t levels = 1;
+  if (where == Where::pressure) levels = cells.size() - 1;
+  if (where == Where::velocity) levels = fluid.velocity_levels();
+  if (where == Where::velocity_above) levels = fluid.velocity_levels() - 1;
+  levels = std::max<std::size_t>(levels, 1);
+  return std::accumulate(cells.begin(), cells.begin() + levels, 0.0) / static_cast<double>(levels);
+}
 
 nlohmann::json study(const std::string& path, int steps, const std::vector<std::string>& overrides) {
   const Case scene = read_case(path, overrides);
@@ -108,10 +130,6 @@ nlohmann::json study(const std::string& path, int steps, const std::vector<std::
   for (int n = 0; n < steps; ++n) simulation.step();
   watch(false);
   const double cells = simulation.grid().index().owned();
-  const auto level_cells = simulation.fluid().multigrid_cells();
-  double smoothed = 0;  // mean over the levels that smooth
-  for (std::size_t l = 0; l + 1 < level_cells.size(); ++l) smoothed += level_cells[l];
-  if (level_cells.size() > 1) smoothed /= static_cast<double>(level_cells.size() - 1);
   nlohmann::json kernels = nlohmann::json::array();
   for (const auto& [label, t] : times) {
     nlohmann::json row{{"kernel", label},
@@ -120,7 +138,7 @@ nlohmann::json study(const std::string& path, int steps, const std::vector<std::
                        {"share", t.seconds / plain}};
     const auto found = definitions.find(label);
     if (found != definitions.end()) {
-      const double count = found->second.levels ? smoothed : cells;
+      const double count = cells_of(simulation.fluid(), found->second.where);
       row["bytes_per_cell"] = 8 * found->second.doubles;
       row["operations_per_cell"] = found->second.operations;
       row["GB_per_s"] = 8e-9 * found->second.doubles * count * t.launches / t.seconds;

@@ -28,7 +28,7 @@ void fill_symmetry(const IndexSpace& index, const CellBox& side, const CellBox& 
     const int c = index.cell(i, j, k);
     const int f = index.cell(i < lx ? lx : (i > ux ? ux : i), j < ly ? ly : (j > uy ? uy : j),
                              k < lz ? lz : (k > uz ? uz : k));
-    const Vec3 s = load(area, f + area_offset), inner = load(u, c + inward_offset);
+    const Vec3 s = load(area, f + area_offset), inner = to_double(load(u, c + inward_offset));
     const double square = dot(s, s);
     store(u, c, square > 0 ? inner - (dot(inner, s) / square) * s : inner);
   });

@@ -9,11 +9,12 @@
 namespace corpuscle {
 
 /// u_row = sum of weight u[column]: the rows' part of the linear operator, with the surface at rest.
-inline void apply_homogeneous_rows(const EmbeddedBodies& b, const Components<double>& u) {
+template <class Velocity>
+void apply_homogeneous_rows(const EmbeddedBodies& b, const Velocity& u) {
   const StencilViews row = b.velocity;
   Kokkos::parallel_for("corpuscle::immersed::homogeneous_rows", Policy(0, b.rows), KOKKOS_LAMBDA(int r) {
     Vec3 sum;
-    for (int n = 0; n < row.columns(r); ++n) sum += row.weight(r, n) * load(u, row.column(r, n));
+    for (int n = 0; n < row.columns(r); ++n) sum += row.weight(r, n) * to_double(load(u, row.column(r, n)));
     store(u, row.node(r), sum);
   });
 }

@@ -72,14 +72,6 @@ inline void volume_integral(const GridViews& grid, const Array<NodeKind>& kind, 
   }
 }
 
-/// u += change (compact) on owned cells.
-inline void add_vector(const IndexSpace& index, const Array<double>& change, const Components<double>& u) {
-  const int owned = index.owned();
-  for_owned("corpuscle::fluid::add_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    for (int m = 0; m < 3; ++m) u(index.cell(i, j, k), m) += change(index.compact(i, j, k) + m * owned);
-  });
-}
-
 /// result -= viscous forces on each fluid cell, nN.
 template <bool skewed>
 void subtract_viscous(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind, double mu,

@@ -1,16 +1,20 @@
-// The implicit part of the momentum equation, row-scaled by its diagonal: unknowns and residuals are velocities.
+// The implicit part of the momentum equation over the viscosity, and what its solution needs.
 #pragma once
 
 #include "common/vec3.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid_views.hpp"
 
+#include <type_traits>
+
 namespace corpuscle {
 
 /// Coefficients of the viscous face fluxes. `normal[d]` multiplies the difference across the face; `cross[d][e]`
 /// multiply the tangential differences and are allocated on skewed grids only.
-struct ViscousCoefficients {
+struct NormalCoefficients {
   Array<double> normal[3];
+};
+struct ViscousCoefficients : NormalCoefficients {
   Array<double> cross[3][3];
 };
 
@@ -113,17 +117,17 @@ struct ViscousStencil {
 };
 
 /// Viscous forces on cell c over mu, all three components.
-template <bool skewed, class Velocity>
-KOKKOS_INLINE_FUNCTION Vec3 viscous_force(const ViscousCoefficients& g, const Velocity& u, const IndexSpace& index,
-                                          int c) {
-  Vec3 force;
+template <bool skewed, class Coefficients, class Velocity>
+KOKKOS_FORCEINLINE_FUNCTION auto viscous_force(const Coefficients& g, const Velocity& u, const IndexSpace& index, int c) {
+  using Real = typename Velocity::non_const_value_type;
+  Vector3<Real> force;
   if constexpr (skewed) {
     const ViscousStencil stencil(g, index, c);
-    force = {stencil.apply(u, index, c, 0), stencil.apply(u, index, c, 1), stencil.apply(u, index, c, 2)};
+    for (int m = 0; m < 3; ++m) force[m] = stencil.apply(u, index, c, m);
   } else {
     // Written out, not looped over directions: a loop in here would keep compilers from vectorising over cells.
     const int s1 = index.stride(1), s2 = index.stride(2);
-    const Vec3 here = load(u, c);
+    const Vector3<Real> here = load(u, c);
     force = g.normal[0](c + 1) * (load(u, c + 1) - here) - g.normal[0](c) * (here - load(u, c - 1)) +
             g.normal[1](c + s1) * (load(u, c + s1) - here) - g.normal[1](c) * (here - load(u, c - s1)) +
             g.normal[2](c + s2) * (load(u, c + s2) - here) - g.normal[2](c) * (here - load(u, c - s2));
@@ -140,37 +144,59 @@ KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, No
   return 0.5 * flux * (u(c, m) + u(low, m));
 }
 
-/// out = D^-1 A u on owned cells, compact order with component m at offset m * owned.
-///  fluid:    mass V u - mu (viscous fluxes) [+ rho (convective fluxes with the given face fluxes)]
-///  others:   0 (immersed velocities are eliminated: u holds what their rows make of the fluid's)
-template <bool skewed, bool convective, class Velocity>
-void apply_momentum(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
-                    const Array<double>& diagonal, double mass, double mu, double rho, const Array<double> (&flux)[3],
-                    const Velocity& u, const Array<double>& out) {
-  const IndexSpace index = grid.index;
-  const auto volume = grid.volume;
-  const int owned = index.owned();
-  const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
-  for_owned("corpuscle::fluid::momentum_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
-    if (kind(c) != NodeKind::fluid) {
-      for (int m = 0; m < 3; ++m) out(e + m * owned) = 0;
-      return;
-    }
-    const double inertia = mass * volume(c), scale = 1 / diagonal(c);
-    const Vec3 viscous = viscous_force<skewed>(g, u, index, c);
-    for (int m = 0; m < 3; ++m) {
-      double sum = inertia * u(c, m) - mu * viscous[m];
-      if (convective) {  // not constexpr, as above
+/// The momentum operator over mu at fluid nodes: inertia - viscous fluxes [+ convective fluxes with the given face fluxes].
+/// Immersed velocities are eliminated: u holds there what their rows make of the fluid's.
+struct FaceFluxes {
+  Array<double> flux[3];
+};
+struct NoFluxes {};
+template <bool skewed, bool convective>
+struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes> {
+  IndexSpace index;
+  Array<double> volume;
+  Array<NodeKind> kind;
+  std::conditional_t<skewed, ViscousCoefficients, NormalCoefficients> g;
+  double mass_over_mu, density_over_mu;
+
+  template <class Velocity>
+  KOKKOS_FORCEINLINE_FUNCTION auto apply(const Velocity& u, int c) const {
+    using Real = typename Velocity::non_const_value_type;
+    Vector3<Real> image = (mass_over_mu * volume(c)) * load(u, c) - viscous_force<skewed>(g, u, index, c);
+    if constexpr (convective)
+      for (int m = 0; m < 3; ++m) {
+        double sum = 0;
         for (int d = 0; d < 3; ++d) {
-          const auto& f = d == 0 ? f0 : (d == 1 ? f1 : f2);
           const int next = c + index.stride(d), low = c - index.stride(d);
-          sum += rho * (convective_face(u, f(next), kind(c), kind(next), c, next, m) -
-                        convective_face(u, f(c), kind(low), kind(c), low, c, m));
+          sum += convective_face(u, this->flux[d](next), kind(c), kind(next), c, next, m) -
+                 convective_face(u, this->flux[d](c), kind(low), kind(c), low, c, m);
         }
+        image[m] += density_over_mu * sum;
       }
-      out(e + m * owned) = sum * scale;
-    }
+    return image;
+  }
+};
+
+/// out = A u at fluid nodes, zero elsewhere.
+template <class Operator>
+void apply_momentum(const Operator& a, const Components<float>& u, const Components<float>& out) {
+  for_owned("corpuscle::fluid::momentum_operator", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = a.index.cell(i, j, k);
+    const float fluid = a.kind(c) == NodeKind::fluid ? 1 : 0;
+    store(out, c, fluid * a.apply(u, c));
+  });
+}
+
+/// residual = (history - V grad p) / mu - A u at fluid nodes, zero elsewhere; returns this rank's sum of squares of
+/// `inverse` times it, which is a velocity.
+template <class Operator>
+double momentum_residual(const Operator& a, double mu, const Components<double>& history, const Components<double>& grad_p,
+                         const Components<double>& u, const Array<float>& inverse, const Components<float>& residual) {
+  return sum_owned("corpuscle::fluid::momentum_residual", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = a.index.cell(i, j, k);
+    const double fluid = a.kind(c) == NodeKind::fluid ? 1 : 0, scale = 1 / mu;
+    const Vec3 left = fluid * (scale * (load(history, c) - a.volume(c) * load(grad_p, c)) - a.apply(u, c));
+    residual(c, 0) = left.x, residual(c, 1) = left.y, residual(c, 2) = left.z;
+    return inverse(c) * inverse(c) * dot(left, left);
   });
 }
 
@@ -219,119 +245,6 @@ inline void subtract_convection(const GridViews& grid, const Array<NodeKind>& ki
   });
 }
 
-/// rhs [cell, 3] = D^-1 (history - V grad p) at fluid nodes, zero elsewhere.
-inline void momentum_rhs(const GridViews& grid, const Array<NodeKind>& kind, const Array<double>& diagonal,
-                         const Components<double>& history, const Components<double>& grad_p,
-                         const Components<double>& rhs) {
-  const IndexSpace index = grid.index;
-  const auto volume = grid.volume;
-  for_owned("corpuscle::fluid::momentum_rhs", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const double scale = kind(c) == NodeKind::fluid ? 1 / diagonal(c) : 0.0;
-    for (int m = 0; m < 3; ++m) rhs(c, m) = scale * (history(c, m) - volume(c) * grad_p(c, m));
-  });
-}
-
-/// The momentum operator of an orthogonal grid without convection: A u = D^-1 (mass V u - mu (viscous fluxes)).
-struct MomentumOperator {
-  GridViews grid;
-  ViscousCoefficients g;
-  Array<double> inertia, scale;  // mass V / D and mu / D at fluid nodes, zero elsewhere
-
-  KOKKOS_INLINE_FUNCTION Vec3 apply(const Components<double>& u, int c) const {
-    return inertia(c) * load(u, c) - scale(c) * viscous_force<false>(g, u, grid.index, c);
-  }
-};
-
-/// inertia = mass V / D, scale = mu / D at fluid nodes, zero elsewhere.
-inline void momentum_scales(const IndexSpace& index, const Array<double>& volume, const Array<NodeKind>& kind,
-                            const Array<double>& diagonal, double mass, double mu, const MomentumOperator& a) {
-  for_owned("corpuscle::fluid::momentum_scales", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const double inverse = kind(c) == NodeKind::fluid ? 1 / diagonal(c) : 0.0;
-    a.inertia(c) = mass * volume(c) * inverse;
-    a.scale(c) = mu * inverse;
-  });
-}
-
-/// Upper bound of the operator's eigenvalues on this rank, by Gershgorin's circles.
-inline double largest_row_sum(const MomentumOperator& a) {
-  const IndexSpace index = a.grid.index;
-  double largest = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::fluid::largest_row_sum", Policy(0, index.owned()),
-      KOKKOS_LAMBDA(int e, double& most) {
-        const int c = index.cell(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]));
-        double sum = 0;
-        for (int d = 0; d < 3; ++d) sum += 2 * (a.g.normal[d](c) + a.g.normal[d](c + index.stride(d)));
-        const double row = a.inertia(c) + a.scale(c) * sum;
-        if (row > most) most = row;
-      },
-      Kokkos::Max<double>(largest));
-  return largest;
-}
-
-/// Start vector of the Lanczos process: smooth modes above all, a little of every other, the same on any ranks.
-inline void lanczos_start(const MomentumOperator& a, const Components<double>& v) {
-  const IndexSpace index = a.grid.index;
-  for_owned("corpuscle::fluid::lanczos_start", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const double wave = 12.9 * (index.first[0] + i) + 78.2 * (index.first[1] + j) + 37.7 * (index.first[2] + k);
-    for (int m = 0; m < 3; ++m) v(c, m) = a.scale(c) > 0 ? 1 + 0.3 * std::sin(wave + m) : 0.0;
-  });
-}
-
-/// This rank's sum of D v . w, the inner product in which the operator is symmetric on an orthogonal grid. Over mu.
-inline double diagonal_dot(const MomentumOperator& a, const Components<double>& v, const Components<double>& w) {
-  const IndexSpace index = a.grid.index;
-  return sum_owned("corpuscle::fluid::diagonal_dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    return a.scale(c) > 0 ? dot(load(v, c), load(w, c)) / a.scale(c) : 0.0;
-  });
-}
-
-/// w = A v - beta w on owned cells.
-inline void lanczos_operator(const MomentumOperator& a, double beta, const Components<double>& v, const Components<double>& w) {
-  const IndexSpace index = a.grid.index;
-  for_owned("corpuscle::fluid::lanczos_operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    store(w, c, a.apply(v, c) - beta * load(w, c));
-  });
-}
-
-/// v = factor v - shift w on owned cells.
-inline void lanczos_combine(const IndexSpace& index, double factor, double shift, const Components<double>& w,
-                            const Components<double>& v) {
-  for_owned("corpuscle::fluid::lanczos_combine", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    store(v, c, factor * load(v, c) - shift * load(w, c));
-  });
-}
-
-/// previous = u + momentum (u - previous) + weight (rhs - A u) at fluid nodes, u at others: the next Chebyshev iterate
-/// takes the place of the one before.
-inline void momentum_step(const MomentumOperator& a, double momentum, double weight, const Components<double>& rhs,
-                   const Components<double>& u, const Components<double>& previous) {
-  const IndexSpace index = a.grid.index;
-  for_owned("corpuscle::fluid::momentum_step", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const bool fluid = a.scale(c) > 0;
-    const Vec3 here = load(u, c);
-    const Vec3 next = here + momentum * (here - load(previous, c)) + weight * (load(rhs, c) - a.apply(u, c));
-    store(previous, c, fluid ? next : here);
-  });
-}
-
-/// This rank's sum of squares of rhs - A u over fluid nodes.
-inline double momentum_residual_square(const MomentumOperator& a, const Components<double>& rhs, const Components<double>& u) {
-  const IndexSpace index = a.grid.index;
-  return sum_owned("corpuscle::fluid::momentum_residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const Vec3 r = load(rhs, c) - a.apply(u, c);
-    return a.scale(c) > 0 ? dot(r, r) : 0.0;
-  });
-}
-
 /// This rank's sum of squares of a vector field over owned cells.
 inline double square_of(const IndexSpace& index, const Components<double>& u) {
   return sum_owned("corpuscle::fluid::square", index, KOKKOS_LAMBDA(int i, int j, int k) {
@@ -340,21 +253,65 @@ inline double square_of(const IndexSpace& index, const Components<double>& u) {
   });
 }
 
-/// residual (compact, component m at offset m * owned) = rhs - applied.
-inline void compact_residual(const IndexSpace& index, const Components<double>& rhs, const Array<double>& applied,
-                             const Array<double>& residual) {
-  const int owned = index.owned();
-  for_owned("corpuscle::fluid::compact_residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), e = index.compact(i, j, k);
-    for (int m = 0; m < 3; ++m) residual(e + m * owned) = rhs(c, m) - applied(e + m * owned);
+/// Diagonal of the velocity's multigrid over mu without the faces between fluid nodes: inertia, and the faces to nodes whose
+/// velocity is known. `natural`: sides with a condition on the derivative, which conduct nothing.
+inline void velocity_own_diagonal(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
+                                  double mass_over_mu, const bool (&natural)[3][2], const Array<float>& own) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  const auto g0 = g.normal[0], g1 = g.normal[1], g2 = g.normal[2];
+  double weight[3][2];
+  for (int d = 0; d < 3; ++d)
+    for (int side = 0; side < 2; ++side) weight[d][side] = natural[d][side] ? 0 : 1;
+  const double l0 = weight[0][0], h0 = weight[0][1], l1 = weight[1][0], h1 = weight[1][1], l2 = weight[2][0], h2 = weight[2][1];
+  for_owned("corpuscle::multigrid::velocity_own", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k), s1 = index.stride(1), s2 = index.stride(2);
+    const auto known = [&](int beyond, double conductance, double beyond_side) {
+      if (kind(beyond) == NodeKind::fluid) return 0.0;
+      return kind(beyond) == NodeKind::boundary ? beyond_side * conductance : conductance;
+    };
+    const double sum = known(c - 1, g0(c), l0) + known(c + 1, g0(c + 1), h0) + known(c - s1, g1(c), l1) +
+                       known(c + s1, g1(c + s1), h1) + known(c - s2, g2(c), l2) + known(c + s2, g2(c + s2), h2);
+    own(c) = kind(c) == NodeKind::fluid ? mass_over_mu * volume(c) + sum : 0.0;
   });
 }
 
-/// From compact Krylov vectors to the padded field.
-inline void field_from_compact(const IndexSpace& index, const Array<double>& vector, const Components<double>& field) {
-  const int owned = index.owned();
-  for_owned("corpuscle::fluid::from_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    for (int m = 0; m < 3; ++m) field(index.cell(i, j, k), m) = vector(index.compact(i, j, k) + m * owned);
+/// This rank's sum of inverse^2 a . b: the inner product of residuals, scaled to velocities.
+inline double scaled_dot(const IndexSpace& index, const Array<float>& inverse, const Components<float>& a,
+                         const Components<float>& b) {
+  return sum_owned("corpuscle::fluid::scaled_dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const float sum = a(c, 0) * b(c, 0) + a(c, 1) * b(c, 1) + a(c, 2) * b(c, 2);
+    return inverse(c) * inverse(c) * sum;
+  });
+}
+
+/// u += factor direction at fluid nodes, r -= factor image; returns this rank's scaled r . r.
+inline double advance_velocity(const IndexSpace& index, const Array<float>& inverse, double factor,
+                               const Components<float>& direction, const Components<float>& image,
+                               const Components<double>& u, const Components<float>& r) {
+  const float of_image = factor;
+  return sum_owned("corpuscle::fluid::advance_velocity", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const double step = inverse(c) > 0 ? factor : 0.0;
+    float square = 0;
+    for (int m = 0; m < 3; ++m) {
+      u(c, m) += step * direction(c, m);
+      const float left = r(c, m) - of_image * image(c, m);
+      r(c, m) = left;
+      square += left * left;
+    }
+    return inverse(c) * inverse(c) * square;
+  });
+}
+
+/// p = r + beta (p - w v).
+inline void next_direction(const IndexSpace& index, double beta, double w, const Components<float>& r,
+                           const Components<float>& v, const Components<float>& p) {
+  const float of_p = beta, of_v = -beta * w;
+  for_owned("corpuscle::fluid::next_direction", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    for (int m = 0; m < 3; ++m) p(c, m) = r(c, m) + of_p * p(c, m) + of_v * v(c, m);
   });
 }
 

@@ -1,16 +1,41 @@
-// Geometric multigrid for the pressure equation of an orthogonal grid: cells are joined in pairs along the directions
-// that couple most strongly, and conductances of coarse faces are those of the fine faces on them, in parallel. A cycle
-// works in single precision, half the memory and twice the lanes of double: what that leaves, the conjugate gradients
-// around it, in double, take out with the rest.
+// Geometric multigrid on an orthogonal grid, for the pressure and for the velocity: cells are joined in pairs along the
+// directions that couple most strongly, and conductances of coarse faces are those of the fine faces on them, in
+// parallel. Pairs are those of the whole grid, so the cycle is the same however the grid is cut over ranks. It works in
+// single precision, half the memory and twice the lanes of double: what that leaves, the iteration around it takes out.
 #pragma once
 
 #include "common/chebyshev.hpp"
+#include "common/vec3.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/halo_copy.hpp"
 
 namespace corpuscle {
 
 using CycleReal = float;
+
+/// The unknown of one cell: a number, or a vector.
+template <class Real>
+KOKKOS_FORCEINLINE_FUNCTION Real value_at(const Array<Real>& field, int c) {
+  return field(c);
+}
+template <class Real>
+KOKKOS_FORCEINLINE_FUNCTION Vector3<Real> value_at(const Components<Real>& field, int c) {
+  return load(field, c);
+}
+template <class Real>
+KOKKOS_FORCEINLINE_FUNCTION void set_value(const Array<Real>& field, int c, Real value) {
+  field(c) = value;
+}
+template <class Real>
+KOKKOS_FORCEINLINE_FUNCTION void set_value(const Components<Real>& field, int c, const Vector3<Real>& value) {
+  store(field, c, value);
+}
+
+/// Kernels are labelled by what they solve for.
+template <class Field>
+std::string cycle_label(const char* step) {
+  return std::string(Field::rank == 1 ? "corpuscle::multigrid::" : "corpuscle::velocity_multigrid::") + step;
+}
 
 /// One level. A x at cell c is diagonal(c) x(c) minus the sum over its faces of conductance times x beyond the face;
 /// x is zero beyond physical boundaries. Cells without an unknown have no conductances, and inverse = 0.
@@ -20,56 +45,53 @@ struct LevelOperator {
   Array<Real> conductance[3];  // [cell] of the face between cell - stride(d) and cell
   Array<Real> diagonal, inverse;
 
-  KOKKOS_INLINE_FUNCTION Real apply(const Array<Real>& x, int c) const {
+  template <class Field>
+  KOKKOS_FORCEINLINE_FUNCTION auto apply(const Field& x, int c) const {
     const int s1 = index.stride(1), s2 = index.stride(2);
-    return diagonal(c) * x(c) - conductance[0](c) * x(c - 1) - conductance[0](c + 1) * x(c + 1) -
-           conductance[1](c) * x(c - s1) - conductance[1](c + s1) * x(c + s1) - conductance[2](c) * x(c - s2) -
-           conductance[2](c + s2) * x(c + s2);
+    return diagonal(c) * value_at(x, c) - conductance[0](c) * value_at(x, c - 1) -
+           conductance[0](c + 1) * value_at(x, c + 1) - conductance[1](c) * value_at(x, c - s1) -
+           conductance[1](c + s1) * value_at(x, c + s1) - conductance[2](c) * value_at(x, c - s2) -
+           conductance[2](c + s2) * value_at(x, c + s2);
   }
 };
 
-/// The same for the cycle, and how it is coarsened.
+/// The same for the cycle, and how it is coarsened: coarse cell I holds the cells from factor I + shift.
 struct MultigridLevel : LevelOperator<CycleReal> {
-  int factor[3] = {1, 1, 1};     // cells of this level in one of the next coarser, along each direction
-  bool open[3][2] = {};          // whether another rank's or a periodic image's cells lie beyond a side
+  int factor[3] = {1, 1, 1};  // cells of this level in one of the next coarser, along each direction
+  int shift[3] = {0, 0, 0};   // 1 where the first cell of this rank is the second of a pair
+  bool split = false;         // whether somewhere the cells of a pair belong to different ranks
+  bool closed[3][2] = {};     // sides whose conductance does not count in the diagonal
 };
 
-/// Conductances of the finest level: those of faces whose both nodes have a pressure.
-inline void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask& mask,
-                              const LevelOperator<double>& level) {
+/// Conductances between nodes that both have a pressure, on owned cells and one halo layer.
+template <class Real>
+void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask& mask,
+                       const LevelOperator<Real>& level) {
   const IndexSpace index = level.index;
   for (int d = 0; d < 3; ++d) {
-    const auto g = level.conductance[d], from = coefficient[d];
+    const auto g = level.conductance[d];
+    const auto from = coefficient[d];
     const int stride = index.stride(d);
-    std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
+    std::array<int, 3> upper{index.n[0] + 1, index.n[1] + 1, index.n[2] + 1};
     upper[d] += 1;
-    for_box("corpuscle::multigrid::conductance", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+    for_box("corpuscle::multigrid::conductance", {-1, -1, -1}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
       const int c = index.cell(i, j, k);
       g(c) = mask(c) && mask(c - stride) ? from(c) : 0.0;
     });
   }
 }
 
-/// The finest level of the cycle.
-inline void round_operator(const LevelOperator<double>& from, const MultigridLevel& to) {
-  const auto f0 = from.conductance[0], f1 = from.conductance[1], f2 = from.conductance[2];
-  const auto t0 = to.conductance[0], t1 = to.conductance[1], t2 = to.conductance[2];
-  Kokkos::parallel_for("corpuscle::multigrid::round", Policy(0, from.index.size()), KOKKOS_LAMBDA(int c) {
-    t0(c) = f0(c), t1(c) = f1(c), t2(c) = f2(c);
-    to.diagonal(c) = from.diagonal(c);
-    to.inverse(c) = from.inverse(c);
-  });
-}
-
-/// Cells of the finer level in coarse cell C along d.
+/// Cells of the finer level in coarse cell I along d, which may lie beyond a periodic or another rank's side.
 KOKKOS_INLINE_FUNCTION int children(const MultigridLevel& fine, int d, int coarse) {
-  const int first = fine.factor[d] * coarse, rest = fine.index.n[d] - first;
+  int at = fine.index.first[d] + fine.shift[d] + fine.factor[d] * coarse;
+  if (at < 0) at = fine.factor[d] * ((fine.index.global[d] - 1) / fine.factor[d]);
+  const int rest = fine.index.global[d] - at;
   return rest < fine.factor[d] ? rest : fine.factor[d];
 }
 
-/// Conductances of the next coarser level. The distance between cell centres along a joined direction grows, so a
-/// conductance is divided by the mean number of cells joined on its two sides; the cells beyond an open side count as
-/// two, so that both sides' owners agree.
+/// Conductances of the next coarser level; those of the finer one in its first halo layer must be valid. The distance
+/// between cell centres along a joined direction grows, so a conductance is divided by the mean number of cells joined
+/// on its two sides.
 inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLevel& coarse) {
   const IndexSpace index = coarse.index, fine_index = fine.index;
   for (int d = 0; d < 3; ++d) {
@@ -80,19 +102,13 @@ inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLeve
     for_box("corpuscle::multigrid::coarsen", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
       const int at[3] = {i, j, k};
       int first[3];
-      for (int m = 0; m < 3; ++m) first[m] = fine.factor[m] * at[m];
-      const bool low = at[d] == 0, high = at[d] == index.n[d];
+      for (int m = 0; m < 3; ++m) first[m] = fine.factor[m] * at[m] + fine.shift[m];
+      const bool low = index.first[d] + at[d] == 0 && !index.periodic[d];
+      const bool high = index.first[d] + at[d] == index.global[d];
       if (high) first[d] = fine_index.n[d];
-      CycleReal cells = 1;
-      if (fine.factor[d] > 1) {
-        const int above = high ? 0 : children(fine, d, at[d]), below = low ? 0 : children(fine, d, at[d] - 1);
-        if (low)
-          cells = fine.open[d][0] ? 2 : above;
-        else if (high)
-          cells = fine.open[d][1] ? 2 : below;
-        else
-          cells = CycleReal(0.5) * (above + below);
-      }
+      const int below = low ? 0 : children(fine, d, at[d] - 1);
+      const int above = !high ? children(fine, d, at[d]) : (index.periodic[d] ? fine.factor[d] : 0);
+      const CycleReal cells = low ? above : (above == 0 ? below : CycleReal(0.5) * (above + below));
       const int c = fine_index.cell(first[0], first[1], first[2]);
       CycleReal sum = 0;
       for (int b = 0; b < children(fine, f, at[f]); ++b)
@@ -103,18 +119,53 @@ inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLeve
   }
 }
 
-/// Diagonals. `pinned` (padded cell number, -1 for none) gets `extra` on top, which fixes the level of an all-Neumann
-/// problem.
+/// coarse_values = sums over the joined cells. Without branches, so that it vectorises: what is not joined is read (it is
+/// never beyond the halo) and counts nothing.
+template <class Field>
+void restrict_sums(const MultigridLevel& fine, const IndexSpace& coarse, const Field& values, const Field& coarse_values) {
+  const IndexSpace index = fine.index;
+  const int s1 = index.stride(1), s2 = index.stride(2);
+  for_owned(cycle_label<Field>("restrict"), coarse, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1],
+                             fine.factor[2] * k + fine.shift[2]);
+    const CycleReal w0 = children(fine, 0, i) - 1, w1 = children(fine, 1, j) - 1, w2 = children(fine, 2, k) - 1;
+    const auto pair = [&](int at) { return value_at(values, at) + w0 * value_at(values, at + 1); };
+    set_value(coarse_values, coarse.cell(i, j, k),
+              pair(c) + w1 * pair(c + s1) + w2 * (pair(c + s2) + w1 * pair(c + s1 + s2)));
+  });
+}
+
+/// diagonal = own + the conductances of a cell's faces.
 template <class Real>
-void level_diagonals(const LevelOperator<Real>& level, int pinned, Real extra) {
+void level_diagonals(const LevelOperator<Real>& level, const bool (&closed)[3][2], const Array<CycleReal>& own) {
   const IndexSpace index = level.index;
+  bool low[3], high[3];
+  for (int d = 0; d < 3; ++d) low[d] = closed[d][0], high[d] = closed[d][1];
+  const bool l0 = low[0], l1 = low[1], l2 = low[2], h0 = high[0], h1 = high[1], h2 = high[2];
   for_owned("corpuscle::multigrid::diagonal", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    Real sum = 0;
-    for (int d = 0; d < 3; ++d) sum += level.conductance[d](c) + level.conductance[d](c + index.stride(d));
-    if (c == pinned) sum += extra;
+    Real sum = own(c);
+    if (i > 0 || !l0) sum += level.conductance[0](c);
+    if (j > 0 || !l1) sum += level.conductance[1](c);
+    if (k > 0 || !l2) sum += level.conductance[2](c);
+    if (i + 1 < index.n[0] || !h0) sum += level.conductance[0](c + index.stride(0));
+    if (j + 1 < index.n[1] || !h1) sum += level.conductance[1](c + index.stride(1));
+    if (k + 1 < index.n[2] || !h2) sum += level.conductance[2](c + index.stride(2));
     level.diagonal(c) = sum;
     level.inverse(c) = sum > 0 ? 1 / sum : Real(0);
+  });
+}
+
+/// own = 0 but at `pinned` (padded cell number on the rank that owns it, -1 elsewhere), where it is as large as the
+/// conductances together: that fixes the level of an all-Neumann problem.
+inline void pin_level(const LevelOperator<double>& level, int pinned, const Array<CycleReal>& own) {
+  Kokkos::deep_copy(Exec(), own, CycleReal(0));
+  if (pinned < 0) return;
+  const IndexSpace index = level.index;
+  Kokkos::parallel_for("corpuscle::multigrid::pin", Policy(0, 1), KOKKOS_LAMBDA(int) {
+    double sum = 0;
+    for (int d = 0; d < 3; ++d) sum += level.conductance[d](pinned) + level.conductance[d](pinned + index.stride(d));
+    own(pinned) = sum;
   });
 }
 
@@ -127,67 +178,64 @@ inline double sum_conductances(const MultigridLevel& level, int d) {
 }
 
 /// previous, x = the first and the second Chebyshev iterate from zero.
-inline void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& first,
-                             const ChebyshevSteps::Step& second, const Array<CycleReal>& b,
-                             const Array<CycleReal>& previous, const Array<CycleReal>& x) {
+template <class Field>
+void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& first,
+                      const ChebyshevSteps::Step& second, const Field& b, const Field& previous, const Field& x) {
   const IndexSpace index = level.index;
   const double w0 = first.weight, w1 = second.weight, m1 = second.momentum;
-  const CycleReal of_first = w0, of_own = w0 + m1 * w0 + w1 - w1 * w0, of_others = w1 * w0;
+  const CycleReal of_first = w0, of_others = w1 * w0, of_own = w0 + m1 * w0 + w1 - w1 * w0;
   const auto inverse = level.inverse;
   const auto g0 = level.conductance[0], g1 = level.conductance[1], g2 = level.conductance[2];
   const int s1 = index.stride(1), s2 = index.stride(2);
-  for_owned("corpuscle::multigrid::smooth_from_zero", index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned(cycle_label<Field>("smooth_from_zero"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const CycleReal scaled = inverse(c) * b(c);
-    const CycleReal around = g0(c) * inverse(c - 1) * b(c - 1) + g0(c + 1) * inverse(c + 1) * b(c + 1) +
-                          g1(c) * inverse(c - s1) * b(c - s1) + g1(c + s1) * inverse(c + s1) * b(c + s1) +
-                          g2(c) * inverse(c - s2) * b(c - s2) + g2(c + s2) * inverse(c + s2) * b(c + s2);
-    previous(c) = of_first * scaled;
+    const auto scaled = inverse(c) * value_at(b, c);
+    const auto around = g0(c) * inverse(c - 1) * value_at(b, c - 1) + g0(c + 1) * inverse(c + 1) * value_at(b, c + 1) +
+                        g1(c) * inverse(c - s1) * value_at(b, c - s1) + g1(c + s1) * inverse(c + s1) * value_at(b, c + s1) +
+                        g2(c) * inverse(c - s2) * value_at(b, c - s2) + g2(c + s2) * inverse(c + s2) * value_at(b, c + s2);
+    set_value(previous, c, of_first * scaled);
     // D^-1 A x1 = w0 (scaled - inverse * around), since D^-1 D = 1 where there is an unknown and scaled = 0 elsewhere
-    x(c) = of_own * scaled + of_others * inverse(c) * around;
+    set_value(x, c, of_own * scaled + of_others * inverse(c) * around);
   });
 }
 
 /// previous = x + momentum (x - previous) + weight D^-1 (b - A x): the next iterate takes the place of the one before.
-inline void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const Array<CycleReal>& b,
-                   const Array<CycleReal>& x, const Array<CycleReal>& previous) {
+template <class Field>
+void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const Field& b, const Field& x,
+            const Field& previous) {
   const IndexSpace index = level.index;
   const CycleReal momentum = step.momentum, weight = step.weight;
-  for_owned("corpuscle::multigrid::smooth", index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned(cycle_label<Field>("smooth"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    previous(c) = x(c) + momentum * (x(c) - previous(c)) + weight * level.inverse(c) * (b(c) - level.apply(x, c));
+    const auto here = value_at(x, c);
+    set_value(previous, c, here + momentum * (here - value_at(previous, c)) +
+                               weight * level.inverse(c) * (value_at(b, c) - level.apply(x, c)));
   });
 }
 
-/// residual = b - A x where there is an unknown, zero elsewhere; then coarse_b = its sums over the joined cells.
-inline void restrict_residual(const MultigridLevel& level, const IndexSpace& coarse, const Array<CycleReal>& b,
-                              const Array<CycleReal>& x, const Array<CycleReal>& residual,
-                              const Array<CycleReal>& coarse_b) {
+/// residual = b - A x where there is an unknown, zero elsewhere.
+template <class Field>
+void level_residual(const MultigridLevel& level, const Field& b, const Field& x, const Field& residual) {
   const IndexSpace index = level.index;
-  for_owned("corpuscle::multigrid::residual", index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned(cycle_label<Field>("residual"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const CycleReal left = b(c) - level.apply(x, c);
-    residual(c) = level.inverse(c) > 0 ? left : CycleReal(0);
-  });
-  for_owned("corpuscle::multigrid::restrict", coarse, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(level.factor[0] * i, level.factor[1] * j, level.factor[2] * k);
-    CycleReal sum = 0;
-    for (int n2 = 0; n2 < children(level, 2, k); ++n2)
-      for (int n1 = 0; n1 < children(level, 1, j); ++n1)
-        for (int n0 = 0; n0 < children(level, 0, i); ++n0)
-          sum += residual(c + n0 + n1 * index.stride(1) + n2 * index.stride(2));
-    coarse_b(coarse.cell(i, j, k)) = sum;
+    const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
+    set_value(residual, c, unknown * (value_at(b, c) - level.apply(x, c)));
   });
 }
 
 /// x += what the coarse level found, the same for all cells joined in one.
-inline void add_correction(const MultigridLevel& level, const IndexSpace& coarse, const Array<CycleReal>& correction,
-                           const Array<CycleReal>& x) {
+template <class Field>
+void add_correction(const MultigridLevel& level, const IndexSpace& coarse, const Field& correction, const Field& x) {
   const IndexSpace index = level.index;
-  for_owned("corpuscle::multigrid::prolong", index, KOKKOS_LAMBDA(int i, int j, int k) {
+  // Factors are 1 or 2: shifts of bits for divisions, which would keep the loop from vectorising.
+  const int b0 = level.factor[0] - 1, b1 = level.factor[1] - 1, b2 = level.factor[2] - 1;
+  const int o0 = level.factor[0] - level.shift[0], o1 = level.factor[1] - level.shift[1], o2 = level.factor[2] - level.shift[2];
+  for_owned(cycle_label<Field>("prolong"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const CycleReal found = correction(coarse.cell(i / level.factor[0], j / level.factor[1], k / level.factor[2]));
-    x(c) += level.inverse(c) > 0 ? found : CycleReal(0);
+    const int from = coarse.cell(((i + o0) >> b0) - 1, ((j + o1) >> b1) - 1, ((k + o2) >> b2) - 1);
+    const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
+    set_value(x, c, value_at(x, c) + unknown * value_at(correction, from));
   });
 }
 

@@ -52,6 +52,13 @@ enum class NodeKind : std::int8_t {
   none = 4       // void layers
 };
 
+// A loop over cells vectorises only if all that it calls is inlined.
+#if defined(__GNUC__)
+#define CORPUSCLE_INLINE_ALL __attribute__((flatten))
+#else
+#define CORPUSCLE_INLINE_ALL
+#endif
+
 /// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper. Cells must be independent of each other: on
 /// the host each line of cells along i is a vectorised loop.
 template <class Body>
@@ -64,7 +71,7 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
   Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
 #else
   const int ni = lower[0], ui = upper[0], nj = upper[1] - lower[1], lj = lower[1], lk = lower[2];
-  Kokkos::parallel_for(label, Policy(0, nj * (upper[2] - lk)), [=](int line) {
+  Kokkos::parallel_for(label, Policy(0, nj * (upper[2] - lk)), [=](int line) CORPUSCLE_INLINE_ALL {
     const int j = lj + line % nj, k = lk + line / nj;
     const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
 #if defined(__GNUC__) && !defined(__clang__)
@@ -96,7 +103,7 @@ double sum_owned(const std::string& label, const IndexSpace& index, const Body& 
   const int ni = index.n[0], nj = index.n[1];
   Kokkos::parallel_reduce(
       label, Policy(0, nj * index.n[2]),
-      [=](int line, double& total) {
+      [=](int line, double& total) CORPUSCLE_INLINE_ALL {
         const int j = line % nj, k = line / nj;
         const Body cell = body;
         double part = 0;

@@ -86,6 +86,7 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     sides_.push_back(side);
     prescribed_ = prescribed_ || s.type == Type::velocity_inlet || s.type == Type::moving_wall;
     has_outflow_ = has_outflow_ || s.type == Type::outflow;
+    natural_[side.d][side.end] = s.type == Type::outflow || s.type == Type::symmetry;
   }
   std::stable_sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
     return fill_order(a.settings.type) < fill_order(b.settings.type);
@@ -183,7 +184,8 @@ void BoundaryConditions::set_time(double t) {
   }
 }
 
-void BoundaryConditions::fill_sides(const Components<double>& u, bool homogeneous) const {
+template <class Velocity>
+void BoundaryConditions::fill_sides(const Velocity& u, bool homogeneous) const {
   const IndexSpace& index = grid_->index();
   for (const auto& side : sides_) {
     if (!side.here) continue;
@@ -200,6 +202,14 @@ void BoundaryConditions::fill_sides(const Components<double>& u, bool homogeneou
           fill_given(index, side.box, given_, u);
     }
   }
+}
+
+template void BoundaryConditions::fill_sides(const Components<double>&, bool) const;
+template void BoundaryConditions::fill_sides(const Components<float>&, bool) const;
+
+void BoundaryConditions::clear_natural(const Components<float>& u) const {
+  for (const auto& side : sides_)
+    if (side.here && natural_[side.d][side.end]) fill_zero(grid_->index(), side.box, u);
 }
 
 double BoundaryConditions::balance(const Array<double> (&flux)[3], double growth) const {

@@ -17,7 +17,9 @@ class BoundaryConditions {
   /// Fill the boundary layer of u, halos included, from its fluid cells (whose halos are up to date).
   void fill(const Components<double>& u) const { fill_sides(u, false); }
   /// The same with all prescribed velocities zero: the boundary's part of the linear operator.
-  void fill_homogeneous(const Components<double>& u) const { fill_sides(u, true); }
+  void fill_homogeneous(const Components<float>& u) const { fill_sides(u, true); }
+  /// Zero where fill_homogeneous() may have put something else.
+  void clear_natural(const Components<float>& u) const;
 
   /// Without an outflow the prescribed velocities must carry exactly `growth` (um3/us, of the bodies inside) out of the
   /// block. Spreads what is missing evenly over the prescribed sides and returns it over their area, um/us.
@@ -26,6 +28,8 @@ class BoundaryConditions {
   /// [cell] 1 at boundary nodes of outflow sides, where pressure is given.
   const PressureMask& outflow() const { return outflow_; }
   bool has_outflow() const { return has_outflow_; }
+  /// [direction][low, high] sides with a condition on the velocity's derivative: outflow and symmetry.
+  const bool (&natural() const)[3][2] { return natural_; }
   /// Largest prescribed speed at any time, um/us.
   double largest_speed() const { return largest_speed_; }
   /// Prescribed velocity at boundary nodes, [cell, 3] um/us; allocated only if some side prescribes one.
@@ -45,14 +49,15 @@ class BoundaryConditions {
     CellBox faces;       // owned faces of the side
   };
   void set_profile(const Side& side, const GridSettings* shape);
-  void fill_sides(const Components<double>& u, bool homogeneous) const;
+  template <class Velocity>
+  void fill_sides(const Velocity& u, bool homogeneous) const;
   double time_factor(const BoundarySettings& settings, double t) const;
 
   Grid* grid_;
   std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges
   PressureMask outflow_;
   Components<double> profile_, given_;
-  bool has_outflow_ = false, prescribed_ = false;
+  bool has_outflow_ = false, prescribed_ = false, natural_[3][2] = {};
   double largest_speed_ = 0;
 };
 

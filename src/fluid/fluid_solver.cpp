@@ -35,7 +35,7 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
       imposed_gradient_(1e-3 * to_vec3(settings.pressure_gradient_Pa_per_um)),
       skewed_(!grid.orthogonal()) {
   const int n = grid.index().size(), owned = grid.index().owned();
-  for (auto* field : {&u_, &u_old_, &u_older_, &work_, &history_, &grad_p_, &rhs_})
+  for (auto* field : {&u_, &u_old_, &u_older_, &work_, &history_, &grad_p_})
     *field = Components<double>("corpuscle::fluid::velocity", n, 3);
   for (auto* field : {&p_, &p_old_, &psi_field_, &diagonal_}) *field = Array<double>("corpuscle::fluid::scalar", n);
   const bool convective = settings_.convection != FluidSettings::Convection::none;
@@ -49,8 +49,6 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     for (int e = 0; e < 3 && skewed_; ++e)
       if (e != d) g_.cross[d][e] = Array<double>("corpuscle::fluid::cross_coefficient", n);
   }
-  if (skewed_ || settings_.convection == FluidSettings::Convection::implicit)
-    krylov_ = std::make_unique<KrylovVectors>(grid.comm(), 3 * owned);
   negative_divergence_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
   kind_ = grid.views().base_kind;
   mask_ = PressureMask("corpuscle::fluid::pressure_mask", n);
@@ -59,6 +57,11 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     viscous_coefficients<true>(grid.views(), g_);
   else
     viscous_coefficients<false>(grid.views(), g_);
+  hierarchy_ = std::make_unique<MultigridHierarchy>(grid, g_.normal);
+  momentum_ = std::make_unique<Momentum>(*hierarchy_, n);
+  for (auto& level : momentum_->cycle.levels())
+    for (int d = 0; d < 3; ++d)
+      for (int side = 0; side < 2; ++side) level.views.closed[d][side] = grid.halo().neighbour(d, side) < 0;
   if (skewed_) {
     kind_at_setup_ = Array<NodeKind>(uninitialised("corpuscle::fluid::kind_at_setup"), n);
     Kokkos::deep_copy(kind_at_setup_, grid.views().base_kind);
@@ -66,16 +69,15 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     pressure_solver_ =
         std::make_unique<PressureSolver>(grid.comm(), grid.index(), grid.halo(), true, settings.max_iterations);
   } else {
-    multigrid_ = std::make_unique<PressureMultigrid>(grid, g_.normal, settings.max_iterations);
+    multigrid_ = std::make_unique<PressureMultigrid>(*hierarchy_, g_.normal, settings.max_iterations);
   }
-  if (!krylov_) operator_ = {grid.views(), g_, Array<double>("corpuscle::fluid::momentum_inertia", n),
-               Array<double>("corpuscle::fluid::momentum_scale", n)};
   fill_matrix(kind_);
 }
 
 void FluidSolver::fill_matrix(const Array<NodeKind>& kind) {
   mark_pressure(kind, boundaries_.outflow(), mask_);
   if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind);
+  hierarchy_->update(mask_);
   if (multigrid_) return multigrid_->update(mask_, pinned_);
   pressure_rows<true>(grid_->views(), g_.normal, kind, mask_, pressure_solver_->pattern(), pinned_,
                       pressure_solver_->values());
@@ -114,11 +116,15 @@ void FluidSolver::fill_halos(const Components<double>& u) {
 }
 
 /// Immersed nodes of neighbouring ranks; a rank alone has set its own.
-void FluidSolver::exchange_immersed(const Components<double>& u) {
+template <class Velocity>
+void FluidSolver::exchange_immersed(const Velocity& u) {
   if (grid_->comm().size() > 1 || grid_->index().periodic[0] || grid_->index().periodic[1] ||
       grid_->index().periodic[2])
     grid_->halo().exchange(u);
 }
+
+template void FluidSolver::exchange_immersed(const Components<double>&);
+template void FluidSolver::exchange_immersed(const Components<float>&);
 
 /// Everything that follows from the velocity at fluid nodes: halos, boundary nodes, immersed nodes.
 void FluidSolver::complete_velocity(const EmbeddedBodies* bodies) {
@@ -139,9 +145,9 @@ void FluidSolver::begin_step(double dt) {
   mass1_ = rho * (second_order ? 2.0 : 1.0) / dt;
   mass2_ = rho * (second_order ? -0.5 : 0.0) / dt;
   momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
-  if (!krylov_ && mass_ != spectrum_.mass) {
-    bound_spectrum();
-    spectrum_.mass = mass_;
+  if (mass_ != momentum_->mass) {
+    momentum_->depth = momentum_depth();
+    momentum_->mass = mass_;
   }
   // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
   if (second_order)
@@ -257,8 +263,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
 }
 
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
-  if (!krylov_)
-    momentum_scales(grid_->index(), grid_->views().volume, kind_, diagonal_, mass_, mu_, operator_);
+  update_momentum_cycle();
   assemble_history(time);
   complete_velocity(bodies);
   // The answer depends on the pressure it starts from: every solve of a step starts from the same.
@@ -280,6 +285,12 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   }
   negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
   statistics_.divergence = grid_->comm().max(largest_magnitude(negative_divergence_));
+}
+
+std::vector<int> FluidSolver::multigrid_cells() const {
+  std::vector<int> counts;
+  for (const auto& level : hierarchy_->levels()) counts.push_back(level.views.index.owned());
+  return counts;
 }
 
 FluidSolver::State FluidSolver::state() const {

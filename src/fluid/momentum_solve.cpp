@@ -1,5 +1,6 @@
-// The momentum equation of FluidSolver: residual, and its solution by Chebyshev iteration or BiCGStab.
+// The momentum equation of FluidSolver: residual, and corrections in single precision by BiCGStab with a multigrid cycle.
 #include "core/error.hpp"
+#include "fluid/bicgstab.hpp"
 #include "fluid/embedded_rows.hpp"
 #include "fluid/fluid_solver.hpp"
 #include "fluid/flux.hpp"
@@ -7,164 +8,155 @@
 
 #include <fmt/format.h>
 
-#include <KokkosBlas1_nrm2_squared.hpp>
 #include <algorithm>
 #include <cmath>
 
 namespace corpuscle {
 
-namespace {
-
-/// Smallest eigenvalue of the symmetric tridiagonal matrix, by bisection on the number of negative pivots.
-double lowest_eigenvalue(const std::vector<double>& diagonal, const std::vector<double>& below) {
-  double low = 1e300, high = 1e300;
-  for (std::size_t n = 0; n < diagonal.size(); ++n) {
-    const double left = n > 0 ? below[n - 1] : 0, right = n + 1 < diagonal.size() ? below[n] : 0;
-    low = std::min(low, diagonal[n] - left - right);
-    high = std::min(high, diagonal[n]);
-  }
-  for (int halving = 0; halving < 60; ++halving) {
-    const double middle = 0.5 * (low + high);
-    double pivot = 1;
-    bool negative = false;
-    for (std::size_t n = 0; n < diagonal.size() && !negative; ++n) {
-      pivot = diagonal[n] - middle - (n > 0 ? below[n - 1] * below[n - 1] / pivot : 0.0);
-      negative = pivot <= 0;
-    }
-    (negative ? high : low) = middle;
-  }
-  return low;
-}
-
-}  // namespace
-
-/// out = D^-1 A u, compact.
-void FluidSolver::apply_to_field(const Components<double>& u, const Array<double>& out) {
-  const double rho = settings_.density_pg_per_um3;
+/// Calls `use` with the operator of this grid and these settings.
+template <class Use>
+void FluidSolver::with_operator(const Use& use) const {
+  const auto fill = [&](auto a) {
+    a.index = grid_->index(), a.volume = grid_->views().volume, a.kind = kind_, a.g = g_;
+    if constexpr (std::is_base_of_v<FaceFluxes, decltype(a)>)
+      for (int d = 0; d < 3; ++d) a.flux[d] = flux_extrapolated_[d];
+    a.mass_over_mu = mass_ / mu_, a.density_over_mu = settings_.density_pg_per_um3 / mu_;
+    use(a);
+  };
   const bool implicit = settings_.convection == FluidSettings::Convection::implicit;
-  const auto& f = implicit ? flux_extrapolated_ : flux_;
   if (skewed_ && implicit)
-    apply_momentum<true, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+    fill(MomentumOperator<true, true>());
   else if (skewed_)
-    apply_momentum<true, false>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+    fill(MomentumOperator<true, false>());
+  else if (implicit)
+    fill(MomentumOperator<false, true>());
   else
-    apply_momentum<false, true>(grid_->views(), g_, kind_, diagonal_, mass_, mu_, rho, f, u, out);
+    fill(MomentumOperator<false, false>());
 }
 
-template <class Vector>
-void FluidSolver::apply(const EmbeddedBodies* bodies, const Vector& v, const Array<double>& out) {
-  field_from_compact(grid_->index(), v, work_);
-  grid_->halo().exchange(work_);
-  boundaries_.fill_homogeneous(work_);
-  if (bodies) {  // immersed velocities follow from the fluid's: they are eliminated from the system
-    apply_homogeneous_rows(*bodies, work_);
-    exchange_immersed(work_);
+/// The system A change = residual for bicgstab(). Inner products are those of velocities.
+class FluidSolver::Correction {
+ public:
+  Correction(FluidSolver& fluid, const EmbeddedBodies* bodies)
+      : f_(fluid), m_(*fluid.momentum_), finest_(m_.cycle.levels()[0]), index_(fluid.grid_->index()), bodies_(bodies) {}
+
+  double start() {
+    Kokkos::deep_copy(Exec(), m_.shadow, m_.r);
+    Kokkos::deep_copy(Exec(), m_.p, m_.r);
+    return dot(m_.r, m_.r);
   }
-  apply_to_field(work_, out);
+  double apply_p() {
+    apply(m_.p, m_.v);
+    return dot(m_.shadow, m_.v);
+  }
+  std::array<double, 2> apply_r() {
+    apply(m_.r, m_.t);
+    return sums(part(m_.t, m_.r), part(m_.t, m_.t));
+  }
+  double advance_v(double alpha) { return f_.grid_->comm().sum(advance(alpha, m_.v)); }
+  std::array<double, 2> advance_t(double omega) {
+    const double square = advance(omega, m_.t);
+    return sums(square, part(m_.shadow, m_.r));
+  }
+  void next_p(double beta, double w) { next_direction(index_, beta, w, m_.r, m_.v, m_.p); }
+
+ private:
+  /// The direction, one multigrid cycle for `b`, stays in the cycle's x. Bodies count as fixed nodes in the cycle.
+  void apply(const Components<float>& b, const Components<float>& image) {
+    f_.boundaries_.clear_natural(finest_.x);
+    finest_.b = b;
+    m_.cycle.run(m_.depth);
+    const auto& direction = finest_.x;
+    f_.grid_->halo().exchange(direction);
+    f_.boundaries_.fill_homogeneous(direction);
+    if (bodies_) {  // immersed velocities follow from the fluid's: they are eliminated from the system
+      apply_homogeneous_rows(*bodies_, direction);
+      f_.exchange_immersed(direction);
+    }
+    f_.with_operator([&](const auto& a) { apply_momentum(a, direction, image); });
+  }
+  double advance(double factor, const Components<float>& image) {
+    return advance_velocity(index_, finest_.views.inverse, factor, finest_.x, image, f_.u_, m_.r);
+  }
+  double part(const Components<float>& a, const Components<float>& b) const {
+    return scaled_dot(index_, finest_.views.inverse, a, b);
+  }
+  std::array<double, 2> sums(double a, double b) const {
+    std::array<double, 2> both{a, b};
+    f_.grid_->comm().sum(both.data(), 2);
+    return both;
+  }
+  double dot(const Components<float>& a, const Components<float>& b) const {
+    return f_.grid_->comm().sum(part(a, b));
+  }
+
+  FluidSolver& f_;
+  Momentum& m_;
+  MultigridCycle<Components<CycleReal>>::Level& finest_;
+  const IndexSpace& index_;
+  const EmbeddedBodies* bodies_;
+};
+
+/// Momentum residual with the present pressure and velocity, um/us: 2-norm over nodes.
+double FluidSolver::find_residual() {
+  double square = 0;
+  with_operator([&](const auto& a) {
+    square = corpuscle::momentum_residual(a, mu_, history_, grad_p_, u_, momentum_->cycle.levels()[0].views.inverse,
+                                          momentum_->r);
+  });
+  return std::sqrt(grid_->comm().sum(square));
 }
 
-/// Right-hand side with the present pressure, and 2-norm of the momentum residual over that of the velocity.
+/// The same over the 2-norm of the velocity.
 double FluidSolver::momentum_residual() {
   const auto scope = timers_->scope("momentum");
   grid_->halo().exchange(p_);
   pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_);
-  momentum_rhs(grid_->views(), kind_, diagonal_, history_, grad_p_, rhs_);
-  double squares[2];
-  if (krylov_) {
-    apply_to_field(u_, krylov_->scratch);
-    compact_residual(grid_->index(), rhs_, krylov_->scratch, krylov_->residual);
-    squares[0] = KokkosBlas::nrm2_squared(krylov_->residual);
-  } else {
-    squares[0] = residual_square();
-  }
-  squares[1] = square_of(grid_->index(), u_);
-  grid_->comm().sum(squares, 2);
+  residual_norm_ = find_residual();
+  const double square = grid_->comm().sum(square_of(grid_->index(), u_));
   const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
-  residual_norm_ = std::sqrt(squares[0]);
-  return std::sqrt(squares[0] / std::max(squares[1], floor));
+  return residual_norm_ / std::sqrt(std::max(square, floor));
 }
 
-double FluidSolver::residual_square() {
-  return momentum_residual_square(operator_, rhs_, u_);
-}
-
+/// Corrections until the residual is small enough, each of at most four digits: single precision has no more to give. Several
+/// are needed where an immersed node is the last one before an outflow, whose velocity lags behind it by one correction.
 void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) {
   const auto scope = timers_->scope("momentum");
-  const double norm = residual_norm_;
+  constexpr double least_reduction = 1e-4, margin = 0.9;
   // Relative to the velocity; to the first residual in the first steps from rest, where there is no velocity yet.
-  const double size = residual > 0 ? norm / residual : 0;
-  const double target = settings_.momentum_tolerance * std::max(size, norm);
-  const auto result = krylov_ ? solve_krylov(bodies, target) : iterate_momentum(bodies, norm, target);
-  statistics_.momentum_iterations += result.iterations;
-  if (!result.converged)
+  const double size = residual > 0 ? residual_norm_ / residual : 0;
+  const double target = settings_.momentum_tolerance * std::max(size, residual_norm_);
+  Correction correction(*this, bodies);
+  int iterations = 0;
+  while (residual_norm_ > target && iterations < settings_.max_iterations) {
+    const auto result = bicgstab(correction, std::max(margin * target, least_reduction * residual_norm_),
+                                 settings_.max_iterations - iterations);
+    iterations += result.iterations;
+    complete_velocity(bodies);
+    residual_norm_ = find_residual();
+  }
+  statistics_.momentum_iterations += iterations;
+  if (!(residual_norm_ <= target))
     throw ComputationError(fmt::format(
         "velocity: the momentum equation did not converge in {} iterations (residual {:.3g} of the velocity, wanted "
         "{:.3g}). Likely cause: a step too long for the flow or a diverging run; reduce time.step_us or raise "
         "fluid.max_iterations",
-        result.iterations, size > 0 ? result.residual / size : result.residual, settings_.momentum_tolerance));
+        iterations, size > 0 ? residual_norm_ / size : residual_norm_, settings_.momentum_tolerance));
 }
 
-KrylovResult FluidSolver::solve_krylov(const EmbeddedBodies* bodies, double target) {
-  const auto result = krylov_->solver.solve(
-      [&](const Array<double>& x, const Array<double>& y) { apply(bodies, x, y); }, krylov_->residual, krylov_->change,
-      target, settings_.max_iterations);
-  add_vector(grid_->index(), krylov_->change, u_);
-  complete_velocity(bodies);
-  return result;
+/// The cycle's equation for the present mass and node kinds, after the hierarchy's update.
+void FluidSolver::update_momentum_cycle() {
+  auto& finest = momentum_->cycle.levels()[0];
+  velocity_own_diagonal(grid_->views(), g_, kind_, mass_ / mu_, boundaries_.natural(), finest.own);
+  momentum_->cycle.update();
 }
 
-/// Chebyshev iteration, in as many steps as theory says the reduction takes, and a few more at a time if it was not
-/// enough (immersed rows change the spectrum a little).
-KrylovResult FluidSolver::iterate_momentum(const EmbeddedBodies* bodies, double norm, double target) {
-  constexpr int more = 3;
-  KrylovResult result{0, norm, norm <= target};
-  ChebyshevSteps steps(spectrum_.lowest, spectrum_.highest);
-  const double centre = spectrum_.highest + spectrum_.lowest, radius = spectrum_.highest - spectrum_.lowest;
-  double predicted = std::ceil(std::acosh(std::max(norm / target, 1.0)) / std::acosh(centre / radius));
-  while (!result.converged && result.iterations < settings_.max_iterations && std::isfinite(result.residual)) {
-    const int batch = std::min(static_cast<int>(std::max(predicted, 1.0)), settings_.max_iterations - result.iterations);
-    for (int n = 0; n < batch; ++n) {
-      const auto step = steps.next();
-      momentum_step(operator_, step.momentum, step.weight, rhs_, u_, work_);
-      std::swap(u_, work_);
-      complete_velocity(bodies);
-    }
-    result.iterations += batch;
-    result.residual = std::sqrt(grid_->comm().sum(residual_square()));
-    result.converged = result.residual <= target;
-    predicted = more;
-  }
-  return result;
-}
-
-/// Eigenvalues of the momentum operator without bodies (which only raise the lowest): from above by Gershgorin, from
-/// below by a few steps of the Lanczos process.
-void FluidSolver::bound_spectrum() {
-  constexpr int steps = 30;
-  constexpr double safety = 0.85;  // Ritz values approach the lowest eigenvalue from above
-  const Comm& comm = grid_->comm();
-  momentum_scales(grid_->index(), grid_->views().volume, grid_->views().base_kind, diagonal_, mass_, mu_, operator_);
-  spectrum_.highest = comm.max(largest_row_sum(operator_));
-  Components<double> v = work_, w = rhs_;
-  std::vector<double> diagonal, below;
-  lanczos_start(operator_, v);
-  Kokkos::deep_copy(w, 0.0);
-  double beta = 0, size = std::sqrt(comm.sum(diagonal_dot(operator_, v, v)));
-  lanczos_combine(grid_->index(), 1 / size, 0, w, v);
-  for (int n = 0; n < steps; ++n) {
-    grid_->halo().exchange(v);
-    boundaries_.fill_homogeneous(v);
-    lanczos_operator(operator_, beta, v, w);
-    const double alpha = comm.sum(diagonal_dot(operator_, v, w));
-    lanczos_combine(grid_->index(), 1, alpha, v, w);
-    diagonal.push_back(alpha);
-    beta = std::sqrt(comm.sum(diagonal_dot(operator_, w, w)));
-    if (!(beta > 1e-10 * spectrum_.highest)) break;
-    below.push_back(beta);
-    lanczos_combine(grid_->index(), 1 / beta, 0, v, w);
-    std::swap(v, w);
-  }
-  spectrum_.lowest = safety * lowest_eigenvalue(diagonal, below);
+/// Coarser levels are of use where neighbours couple more strongly than inertia holds a cell: elsewhere smoothing solves.
+int FluidSolver::momentum_depth() const {
+  const double inertia = mass_ / mu_ * grid_->total_volume();
+  int depth = 0;
+  for (const auto& level : hierarchy_->levels()) depth += level.strength > 2 * inertia;
+  return depth;
 }
 
 }  // namespace corpuscle

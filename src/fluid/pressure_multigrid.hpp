@@ -2,9 +2,8 @@
 // cycle in single precision, whose coarsest level is left to BoomerAMG.
 #pragma once
 
-#include "fluid/multigrid.hpp"
+#include "fluid/multigrid_cycle.hpp"
 #include "fluid/pressure_solver.hpp"
-#include "grid/grid.hpp"
 
 namespace corpuscle {
 
@@ -14,32 +13,24 @@ namespace corpuscle {
 class PressureMultigrid {
  public:
   /// @param coefficient  [cell] of the normal pressure difference, by direction (ViscousCoefficients::normal)
-  PressureMultigrid(Grid& grid, const Array<double> (&coefficient)[3], int max_iterations);
+  PressureMultigrid(MultigridHierarchy& hierarchy, const Array<double> (&coefficient)[3], int max_iterations);
 
-  /// Take over which nodes have a pressure. `pinned` as for pressure_rows.
+  /// Take over which nodes have a pressure, after the hierarchy's own update. `pinned` as for pressure_rows.
   void update(const PressureMask& mask, int pinned);
 
   /// Solve for `x` [cell], from zero, until the residual's 2-norm is below `absolute_tolerance`, or ten digits below
   /// that of `rhs` (compact): then solve again for what is left. The `residual` returned is that of the start.
   KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
 
-  /// Owned cells of the levels, finest first.
-  std::vector<int> cells() const;
-
  private:
-  struct Level {
-    MultigridLevel views;
-    Halo halo;
-    Array<CycleReal> b, x, y;
-  };
-  bool add_coarser();
-  void cycle(std::size_t number);
-  void solve_coarsest(Level& level);
+  using Cycle = MultigridCycle<Array<CycleReal>>;
+  void solve_coarsest(Cycle::Level& level);
 
-  Grid* grid_;
+  Comm comm_;
+  Halo* halo_;
   Array<double> coefficient_[3];
   int max_iterations_;
-  std::vector<Level> levels_;
+  Cycle cycle_;
   std::unique_ptr<PressureSolver> coarsest_;
   Array<double> coarse_rhs_, coarse_x_;
   LevelOperator<double> operator_;

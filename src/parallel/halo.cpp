@@ -145,6 +145,7 @@ void Halo::run(const Field& field) {
 
 template void Halo::run(const Components<double>&);
 template void Halo::run(const Array<double>&);
+template void Halo::run(const Components<float>&);
 template void Halo::run(const Array<float>&);
 template void Halo::run(const Array<int>&);
 template void Halo::run(const Array<NodeKind>&);

@@ -20,6 +20,7 @@ class Halo {
 
   void exchange(const Components<double>& field) { run(field); }
   void exchange(const Array<double>& field) { run(field); }
+  void exchange(const Components<float>& field) { run(field); }
   void exchange(const Array<float>& field) { run(field); }
   void exchange(const Array<int>& field) { run(field); }
   void exchange(const Array<NodeKind>& field) { run(field); }

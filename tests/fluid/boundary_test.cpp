@@ -166,11 +166,19 @@ TEST_CASE("each kind of side fills the boundary as it should", "[fluid]") {
   CHECK(is(index.cell(-1, 5, 2), {0, 0, at(0, 4, 2)[2]}));
   for (int side = 0; side < 6; ++side) CHECK(scene.conditions.is_wall(side) == (side == 1 || side == 2));
 
-  scene.conditions.fill_homogeneous(u);
-  const auto zero = on_host(u);
+  const Components<float> change("corpuscle::test::change", index.size(), 3);
+  Kokkos::parallel_for(
+      "corpuscle::test::change", Policy(0, index.size()), KOKKOS_LAMBDA(int c) { store(change, c, load(u, c)); });
+  scene.conditions.fill_homogeneous(change);
+  const auto zero = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), change);
   CHECK(zero(index.cell(2, -1, 2), 0) == 0);
   CHECK(zero(index.cell(2, 2, -1), 2) == 0);
-  CHECK(zero(index.cell(2, 2, 6), 2) == last[2]);
+  CHECK(zero(index.cell(2, 2, 6), 2) == static_cast<float>(last[2]));
+  scene.conditions.clear_natural(change);
+  const auto cleared = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), change);
+  CHECK(cleared(index.cell(2, 2, 6), 2) == 0);
+  CHECK(cleared(index.cell(-1, 2, 2), 1) == 0);
+  CHECK(cleared(index.cell(2, 2, 5), 2) == static_cast<float>(last[2]));
 }
 
 TEST_CASE("prescribed sides without an outflow are balanced over their area", "[fluid][ranks]") {

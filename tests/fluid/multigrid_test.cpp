@@ -40,7 +40,9 @@ Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const st
   if (with_outflow && index.first[2] + index.n[2] == cells[2])
     mark_box(index, {{0, 0, index.n[2]}, {index.n[0], index.n[1], index.n[2] + 1}}, outflow);
   mark_pressure(kind, outflow, mask);
-  PressureMultigrid solver(grid, g.normal, 100);
+  MultigridHierarchy hierarchy(grid, g.normal);
+  hierarchy.update(mask);
+  PressureMultigrid solver(hierarchy, g.normal, 100);
   solver.update(mask, with_outflow || !comm.root() ? -1 : index.cell(0, 0, 0));
 
   const Array<double> psi("corpuscle::test::psi", size), rhs("corpuscle::test::rhs", index.owned());

@@ -1,0 +1,96 @@
+#include "fluid/multigrid_cycle.hpp"
+
+#include <type_traits>
+#include <utility>
+
+namespace corpuscle {
+
+namespace {
+
+template <class Field>
+Field cycle_vector(const IndexSpace& index) {
+  const std::string label = "corpuscle::multigrid::cycle_vector";
+  if constexpr (Field::rank == 1)
+    return Field(label, index.size());
+  else
+    return Field(label, index.size(), 3);
+}
+
+}  // namespace
+
+template <class Field>
+MultigridCycle<Field>::MultigridCycle(MultigridHierarchy& hierarchy, const Smoothing& smoothing)
+    : hierarchy_(&hierarchy), smoothing_(smoothing) {
+  for (const auto& shared : hierarchy.levels()) {
+    const IndexSpace& index = shared.views.index;
+    Level level{shared.views, Array<CycleReal>("corpuscle::multigrid::own", index.size()), cycle_vector<Field>(index),
+                cycle_vector<Field>(index), cycle_vector<Field>(index)};
+    level.views.diagonal = Array<CycleReal>("corpuscle::multigrid::diagonal", index.size());
+    level.views.inverse = Array<CycleReal>("corpuscle::multigrid::inverse", index.size());
+    levels_.push_back(std::move(level));
+  }
+}
+
+template <class Field>
+void MultigridCycle<Field>::update() {
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    Level& level = levels_[l];
+    Halo& halo = hierarchy_->levels()[l].halo;
+    level_diagonals(level.views, level.views.closed, level.own);
+    halo.exchange(level.views.inverse);
+    if (l + 1 == levels_.size()) break;
+    if (level.views.split) halo.exchange(level.own);
+    restrict_sums(level.views, levels_[l + 1].views.index, level.own, levels_[l + 1].own);
+  }
+}
+
+template <class Field>
+void MultigridCycle<Field>::smooth_down(std::size_t number) {
+  Level& level = levels_[number];
+  Halo& halo = hierarchy_->levels()[number].halo;
+  halo.exchange(level.b);
+  ChebyshevSteps steps(smoothing_.from, smoothing_.to);
+  const auto first = steps.next(), second = steps.next();
+  smooth_from_zero(level.views, first, second, level.b, level.y, level.x);
+  for (int n = 2; n < smoothing_.steps; ++n) {
+    halo.exchange(level.x);
+    smooth(level.views, steps.next(), level.b, level.x, level.y);
+    std::swap(level.x, level.y);
+  }
+}
+
+template <class Field>
+void MultigridCycle<Field>::smooth_up(std::size_t number) {
+  Level& level = levels_[number];
+  ChebyshevSteps steps(smoothing_.from, smoothing_.to);
+  for (int n = 0; n < smoothing_.steps; ++n) {
+    hierarchy_->levels()[number].halo.exchange(level.x);
+    smooth(level.views, steps.next(), level.b, level.x, level.y);
+    std::swap(level.x, level.y);
+  }
+}
+
+template <class Field>
+void MultigridCycle<Field>::descend(std::size_t number, int depth) {
+  Level& level = levels_[number];
+  const bool coarsest = number + 1 == levels_.size();
+  if (coarsest && solve_coarsest) return solve_coarsest(level);
+  smooth_down(number);
+  if (!coarsest && depth > 0) {
+    Halo& halo = hierarchy_->levels()[number].halo;
+    Level& coarse = levels_[number + 1];
+    halo.exchange(level.x);
+    level_residual(level.views, level.b, level.x, level.y);
+    if (level.views.split) halo.exchange(level.y);
+    restrict_sums(level.views, coarse.views.index, level.y, coarse.b);
+    descend(number + 1, depth - 1);
+    if (level.views.split) hierarchy_->levels()[number + 1].halo.exchange(coarse.x);
+    add_correction(level.views, coarse.views.index, coarse.x, level.x);
+  }
+  smooth_up(number);
+}
+
+template class MultigridCycle<Array<CycleReal>>;
+template class MultigridCycle<Components<CycleReal>>;
+
+}  // namespace corpuscle
