@@ -277,7 +277,7 @@ class CellInTube(Problem):
 
     def __init__(self, full):
         super().__init__(full)
-        self.end = 700 if full else 96
+        self.end = 704 if full else 96   # whole numbers of every step
         fine = self.references()[0]
         self.what = (f"`cases/straight_tube.toml` to {self.end} us. Outline: rms distance of the surfaces after putting their "
                      f"centroids together, over {self.radius_um} um (`perf/compare_outlines.py`). Speed: of the cell at the "
