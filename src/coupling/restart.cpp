@@ -107,7 +107,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
 
 void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   const IndexSpace& index = simulation.grid().index();
-  const CheckpointReader file(path);
+  const CheckpointReader file(path, simulation.grid().comm());
   file.require_grid({index.global[0], index.global[1], index.global[2]});
   require_same_parts(path, file, simulation);
   FluidSolver& fluid = simulation.fluid();

@@ -4,9 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <sstream>
 
 #include "core/error.hpp"
+#include "output/checksum.hpp"
 #include "output/on_root.hpp"
 #include "output/report.hpp"
 
@@ -14,6 +17,22 @@ namespace corpuscle {
 namespace {
 
 const std::string format_name = "Corpuscle checkpoint";
+constexpr hsize_t piece = hsize_t{1} << 22;  // entries that a rank reads at once to check them
+
+std::uint32_t sum_over_ranks(const Comm& comm, std::uint32_t part) {
+  return static_cast<std::uint32_t>(comm.sum(static_cast<long>(part)));
+}
+
+/// Checksum of rows [first, first + count) of a stored array.
+template <class T>
+std::uint32_t stored_checksum(const Hdf5File& file, const std::string& name, const Shape& shape, const Slab& rows) {
+  hsize_t entries = 1;
+  for (const auto n : rows.count) entries *= n;
+  std::vector<T> values(entries);
+  file.read(name, rows, values.data());
+  return checksum(shape, rows, values.data());
+}
+
 
 }  // namespace
 
@@ -37,20 +56,36 @@ CheckpointWriter::~CheckpointWriter() {
   if (comm_.root()) std::filesystem::remove(temporary_, ignored);
 }
 
-void CheckpointWriter::add(const std::string& name, const Shape& shape, const double* values) {
+template <class T>
+void CheckpointWriter::add_whole(const std::string& name, const Shape& shape, const T* values) {
   file_->write(name, shape, values);
+  file_->attribute(name, "checksum", static_cast<std::int64_t>(checksum(shape, whole_of(shape), values)));
+  names_ += name + "\n";
+}
+
+template <class T>
+void CheckpointWriter::add_part(const std::string& name, const Shape& shape, const Slab& mine, const T* values) {
+  file_->write(name, shape, mine, values);
+  const auto sum = sum_over_ranks(comm_, checksum(shape, mine, values));
+  file_->attribute(name, "checksum", static_cast<std::int64_t>(sum));
+  names_ += name + "\n";
+}
+
+void CheckpointWriter::add(const std::string& name, const Shape& shape, const double* values) {
+  add_whole(name, shape, values);
 }
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const std::int64_t* values) {
-  file_->write(name, shape, values);
+  add_whole(name, shape, values);
 }
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const Slab& mine, const double* values) {
-  file_->write(name, shape, mine, values);
+  add_part(name, shape, mine, values);
 }
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* values) {
-  file_->write(name, shape, mine, values);
+  add_part(name, shape, mine, values);
 }
 
 void CheckpointWriter::commit() {
+  file_->write_text("arrays", names_);
   file_->attribute("/", "complete", std::int64_t{1});
   file_->close();
   on_root(comm_, [&] {
@@ -62,7 +97,7 @@ void CheckpointWriter::commit() {
   file_.reset();
 }
 
-CheckpointReader::CheckpointReader(const std::string& path) : file_(Hdf5File::read(path)) {
+CheckpointReader::CheckpointReader(const std::string& path, const Comm& comm) : file_(Hdf5File::read(path)) {
   if (!file_.has_attribute("/", "format") || file_.text("/", "format") != format_name)
     throw InputError(fmt::format("{}: this HDF5 file is not a checkpoint of Corpuscle", path));
   const auto version = file_.integer("/", "version");
@@ -77,6 +112,36 @@ CheckpointReader::CheckpointReader(const std::string& path) : file_(Hdf5File::re
   for (int d = 0; d < 3; ++d)
     header_.cells[d] = static_cast<int>(file_.integer("/", fmt::format("cells_{}", "ijk"[d])));
   header_.resolved = file_.read_text("case");
+  std::istringstream names(file_.read_text("arrays"));
+  for (std::string name; std::getline(names, name);) check(name, comm);
+}
+
+/// The ranks share the array's rows. A rank that cannot read its own counts as a wrong sum, so that all ranks stop.
+void CheckpointReader::check(const std::string& name, const Comm& comm) const {
+  const Shape shape = file_.has(name) ? file_.shape(name) : Shape{};
+  std::uint32_t sum = 0;
+  double unreadable = shape.empty() || !file_.has_attribute(name, "checksum") ? 1 : 0;
+  if (unreadable == 0) {
+    hsize_t row = 1;
+    for (std::size_t d = 1; d < shape.size(); ++d) row *= shape[d];
+    const hsize_t rows = std::max<hsize_t>(piece / std::max<hsize_t>(row, 1), 1);
+    hsize_t turn = 0;
+    try {
+      for (hsize_t first = 0; first < shape[0]; first += rows, ++turn) {
+        if (turn % comm.size() != static_cast<hsize_t>(comm.rank())) continue;
+        Slab part = whole_of(shape);
+        part.offset[0] = first;
+        part.count[0] = std::min(rows, shape[0] - first);
+        sum += file_.is_integer(name) ? stored_checksum<std::int64_t>(file_, name, shape, part)
+                                      : stored_checksum<double>(file_, name, shape, part);
+      }
+    } catch (const InputError&) {
+      unreadable = 1;
+    }
+  }
+  sum = sum_over_ranks(comm, sum);
+  if (comm.max(unreadable) > 0 || sum != static_cast<std::uint32_t>(file_.integer(name, "checksum")))
+    throw InputError(fmt::format("{}: '{}' is damaged: it is not what was written; use another checkpoint", file_.path(), name));
 }
 
 void CheckpointReader::require_grid(const std::array<int, 3>& cells) const {

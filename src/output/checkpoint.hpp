@@ -11,7 +11,7 @@
 namespace corpuscle {
 
 struct CheckpointHeader {
-  static constexpr int format_version = 1;
+  static constexpr int format_version = 2;
 
   std::string git;             // hash of the program that wrote it; filled in by the writer
   std::string resolved;        // the case, every key with the value used
@@ -43,16 +43,23 @@ class CheckpointWriter {
   void commit();
 
  private:
-  std::string path_, temporary_;
+  template <class T>
+  void add_whole(const std::string& name, const Shape& shape, const T* values);
+  template <class T>
+  void add_part(const std::string& name, const Shape& shape, const Slab& mine, const T* values);
+
+  std::string path_, temporary_, names_;  // names of the arrays so far, a line each
   Comm comm_;
   std::unique_ptr<Hdf5File> file_;
 };
 
-/// Each rank reads on its own, so every rank finds the same faults.
+/// Each rank reads what it needs; all find the same faults.
 class CheckpointReader {
  public:
-  /// @throws InputError  the file is missing, not HDF5, cut short, foreign, unfinished, or of another format version
-  explicit CheckpointReader(const std::string& path);
+  /// Opens the file and checks every array against its checksum; collective.
+  /// @throws InputError  the file is missing, not HDF5, cut short, foreign, unfinished, damaged, or of another format
+  ///                     version
+  explicit CheckpointReader(const std::string& path, const Comm& comm = Comm());
 
   const CheckpointHeader& header() const { return header_; }
   /// @throws InputError  the checkpoint's grid is another one
@@ -67,6 +74,7 @@ class CheckpointReader {
   void read(const std::string& name, const Shape& shape, const Slab& mine, std::int64_t* values) const;
 
  private:
+  void check(const std::string& name, const Comm& comm) const;
   void require_shape(const std::string& name, const Shape& shape) const;
 
   Hdf5File file_;

@@ -1,6 +1,7 @@
 // Fields, cells and checkpoints in HDF5, on any number of ranks.
 #ifdef CORPUSCLE_HDF5
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -277,15 +278,45 @@ TEST_CASE("broken and foreign checkpoints are refused by name and fault") {
   {
     auto file = Hdf5File::create(bad.string());
     file.attribute("/", "format", "Corpuscle checkpoint");
-    file.attribute("/", "version", std::int64_t{2});
+    file.attribute("/", "version", std::int64_t{1});
   }
-  REQUIRE_THAT(read_error(bad), Contains("format version 2") && Contains("reads version 1"));
+  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 2"));
   {
     auto file = Hdf5File::create(bad.string());
     file.attribute("/", "format", "Corpuscle checkpoint");
-    file.attribute("/", "version", std::int64_t{1});
+    file.attribute("/", "version", std::int64_t{2});
   }
   REQUIRE_THAT(read_error(bad), Contains("was not finished"));
+}
+
+TEST_CASE("a checkpoint with one wrong bit in any array is refused, and the array is named") {
+  const auto folder = test::fresh_folder("checkpoint_damaged");
+  const auto good = folder / "checkpoint.h5", bad = folder / "bad.h5";
+  write_checkpoint(good.string(), Comm());
+  const auto bytes = test::contents(good);
+  const auto refuse = [&](const std::string& name, const void* entry) {
+    const auto at = bytes.find(std::string(static_cast<const char*>(entry), 8));
+    REQUIRE(at != std::string::npos);
+    for (const int bit : {0, 37, 63}) {
+      auto damaged = bytes;
+      damaged[at + bit / 8] = static_cast<char>(damaged[at + bit / 8] ^ (1 << bit % 8));
+      std::ofstream(bad, std::ios::binary) << damaged;
+      INFO(name << ", bit " << bit);
+      REQUIRE_THAT(read_error(bad), Contains("bad.h5: '" + name + "' is damaged"));
+    }
+  };
+  const double x = 2.0 / 7, p = place(3, 4, 11, 0);
+  const std::int64_t number = -8;
+  refuse("membrane/x", &x);
+  refuse("fluid/p", &p);
+  refuse("search/number", &number);
+  // Two entries that have changed places.
+  auto swapped = bytes;
+  const double third = 1.0 / 3;
+  const auto first = bytes.find(std::string(reinterpret_cast<const char*>(&third), 8));
+  std::swap_ranges(swapped.begin() + first, swapped.begin() + first + 8, swapped.begin() + first + 8);
+  std::ofstream(bad, std::ios::binary) << swapped;
+  REQUIRE_THAT(read_error(bad), Contains("'membrane/x' is damaged"));
 }
 
 TEST_CASE("a checkpoint that was not finished leaves the last good one", "[ranks]") {
