@@ -268,11 +268,13 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   complete_velocity(bodies);
   // The answer depends on the pressure it starts from: every solve of a step starts from the same.
   if (statistics_.solves > 0) Kokkos::deep_copy(Exec(), p_, p_old_);
+  constexpr double senseless = 1e12;  // um/us; single precision overflows beyond
   const double residual = momentum_residual();
-  if (!std::isfinite(residual))
-    throw ComputationError("velocity: not a number in the flow field. Likely cause: a diverging run, with convection "
-                           "most often a step too long, longer than the flow takes across a cell; reduce time.step_us, or set "
-                           "fluid.convection = \"implicit\"");
+  if (!std::isfinite(residual) || residual_norm_ > senseless)
+    throw ComputationError(fmt::format(
+        "velocity: {} in the flow field. Likely cause: a diverging run, with convection most often a step too long, longer than the "
+        "flow takes across a cell; reduce time.step_us, or set fluid.convection = \"implicit\"",
+        std::isfinite(residual) ? "senselessly large numbers" : "not a number"));
   solve_momentum(bodies, residual);
   statistics_.reference_speed =
       std::max(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));

@@ -131,6 +131,7 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
   while (residual_norm_ > target && iterations < settings_.max_iterations) {
     const auto result = bicgstab(correction, std::max(margin * target, least_reduction * residual_norm_),
                                  settings_.max_iterations - iterations);
+    if (result.iterations == 0) break;  // not finite in single precision
     iterations += result.iterations;
     complete_velocity(bodies);
     residual_norm_ = find_residual();
