@@ -30,6 +30,40 @@ inline int first_fluid_cell(const IndexSpace& index, const Array<NodeKind>& kind
   return first < index.size() ? first : -1;
 }
 
+/// mark = 1 at nodes of outflow sides and at `pinned` (-1 for none).
+inline void seed_marks(const PressureMask& outflow, int pinned, const Array<int>& mark) {
+  Kokkos::parallel_for("corpuscle::fluid::seed_marks", Policy(0, static_cast<int>(mark.extent(0))), KOKKOS_LAMBDA(int c) {
+    if (outflow(c) || c == pinned) mark(c) = 1;
+  });
+}
+
+/// next = mark, and 1 in fluid cells beside a marked one. @returns how many of this rank's were not marked yet.
+inline int spread_marks(const IndexSpace& index, const Array<NodeKind>& kind, const Array<int>& mark, const Array<int>& next) {
+  int added = 0;
+  const int s1 = index.stride(1), s2 = index.stride(2);
+  reduce_owned("corpuscle::fluid::spread_marks", index,
+               KOKKOS_LAMBDA(int i, int j, int k, int& sum) {
+                 const int c = index.cell(i, j, k);
+                 const int beside = mark(c - 1) | mark(c + 1) | mark(c - s1) | mark(c + s1) | mark(c - s2) | mark(c + s2);
+                 next(c) = mark(c) | (kind(c) == NodeKind::fluid ? beside : 0);
+                 sum += next(c) - mark(c);
+               },
+               Kokkos::Sum<int>(added));
+  return added;
+}
+
+/// This rank's fluid cells without a mark.
+inline int unmarked_cells(const IndexSpace& index, const Array<NodeKind>& kind, const Array<int>& mark) {
+  int count = 0;
+  reduce_owned("corpuscle::fluid::unmarked_cells", index,
+               KOKKOS_LAMBDA(int i, int j, int k, int& sum) {
+                 const int c = index.cell(i, j, k);
+                 if (kind(c) == NodeKind::fluid && mark(c) == 0) sum += 1;
+               },
+               Kokkos::Sum<int>(count));
+  return count;
+}
+
 /// Largest velocity magnitude at fluid nodes; not a number if any is.
 inline double largest_speed(const IndexSpace& index, const Array<NodeKind>& kind, const Components<double>& u) {
   double square = 0;

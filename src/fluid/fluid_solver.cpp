@@ -225,6 +225,36 @@ void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
       std::max(statistics_.flux_correction, boundaries_.balance(flux_, total_growth) / speed);
 }
 
+/// Fluid nodes, of all ranks, from which no path leads to where the pressure is given: their equation has no solution.
+long FluidSolver::cut_off_nodes() {
+  const IndexSpace& index = grid_->index();
+  Array<int> mark("corpuscle::fluid::mark", index.size()), next("corpuscle::fluid::mark", index.size());
+  for (const auto& seeded : {mark, next})
+    seed_marks(boundaries_.outflow(), boundaries_.has_outflow() ? -1 : pinned_, seeded);
+  for (long added = 1; added > 0;) {
+    grid_->halo().exchange(mark);
+    added = grid_->comm().sum(static_cast<long>(spread_marks(index, kind_, mark, next)));
+    std::swap(mark, next);
+  }
+  return grid_->comm().sum(static_cast<long>(unmarked_cells(index, kind_, mark)));
+}
+
+void FluidSolver::fail_projection(double largest, double target) {
+  const long cut_off = cut_off_nodes();
+  if (cut_off > 0)
+    throw ComputationError(fmt::format(
+        "pressure: the bodies close the channel on this grid: {} fluid nodes have no way to {}. Likely cause: a channel too narrow for "
+        "what is in it, or too few nodes across the gap: refine the grid (grid.nodes), widen the channel, or end the run "
+        "before (time.end_us)",
+        cut_off, boundaries_.has_outflow() ? "an outflow" : "the rest"));
+  throw ComputationError(fmt::format(
+      "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
+      "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "
+      "coupling.robin_coefficient_pg_per_um2_per_us), or prescribed velocities that do not conserve volume; also "
+      "fluid.max_iterations and fluid.divergence_tolerance",
+      target, largest, statistics_.pressure_iterations));
+}
+
 void FluidSolver::project(const EmbeddedBodies* bodies) {
   const auto scope = timers_->scope("pressure");
   make_flux(bodies);
@@ -244,13 +274,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
     if (largest <= (round > 0 ? 1.5 * target : 0.0)) break;
     const auto result = round < rounds ? solve_pressure(round > 0 ? target : share * target) : KrylovResult{};
     statistics_.pressure_iterations += result.iterations;
-    if (!result.converged)
-      throw ComputationError(fmt::format(
-          "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
-          "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "
-          "coupling.robin_coefficient_pg_per_um2_per_us), or prescribed velocities that do not conserve volume; also "
-          "fluid.max_iterations and fluid.divergence_tolerance",
-          target, largest, statistics_.pressure_iterations));
+    if (!result.converged) fail_projection(largest, target);
     grid_->halo().exchange(psi_field_);
     if (skewed_)
       correct_flux<true>(grid_->views(), g_.normal, mask_, psi_field_, flux_);

@@ -114,6 +114,8 @@ class FluidSolver {
   double momentum_residual();
   void solve_momentum(const EmbeddedBodies* bodies, double residual);
   void project(const EmbeddedBodies* bodies);
+  long cut_off_nodes();
+  [[noreturn]] void fail_projection(double largest, double target);
   KrylovResult solve_pressure(double target);
   void make_flux(const EmbeddedBodies* bodies);
   class Correction;

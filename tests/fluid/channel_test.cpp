@@ -246,6 +246,10 @@ TEST_CASE("a run that blows up stops with the reason", "[fluid]") {
   solver.begin_step(1);
   CHECK_THROWS_AS(solver.solve(1, nullptr), ComputationError);
   CHECK_THROWS_WITH(solver.solve(1, nullptr), Catch::Contains("not a number"));
+  FluidSolver blown_up(grid, settings, sides(periodic_between_walls), &shape);
+  set_uniform(blown_up, {1e20, 0, 0});  // its square overflows single precision
+  blown_up.begin_step(1);
+  CHECK_THROWS_WITH(blown_up.solve(1, nullptr), Catch::Contains("senselessly large") && Catch::Contains("time.step_us"));
   FluidSettings strict;
   strict.max_iterations = 1;
   FluidSolver hurried(grid, strict, sides(periodic_between_walls), &shape);
@@ -258,4 +262,27 @@ TEST_CASE("a run that blows up stops with the reason", "[fluid]") {
   hurried.restore(state);
   hurried.begin_step(10);
   CHECK_THROWS_WITH(hurried.solve(10, nullptr), Catch::Contains("did not converge in 1 iterations"));
+}
+
+TEST_CASE("a channel that is closed is named as the cause", "[fluid][ranks]") {
+  const GridSettings shape = box({6, 6, 16}, {3, 3, 8});
+  Grid grid(Comm(), make_node_source(shape), {false, false, false});
+  auto all = sides({Type::wall, Type::wall, Type::wall, Type::wall, Type::velocity_inlet, Type::outflow});
+  all[4].speed = 1e-3;
+  FluidSettings settings;
+  settings.max_iterations = 50;
+  FluidSolver solver(grid, settings, all, &shape);
+  const IndexSpace index = grid.index();
+  Array<NodeKind> kind("corpuscle::test::kind", index.size());
+  Kokkos::deep_copy(kind, grid.views().base_kind);
+  for_owned("corpuscle::test::plug", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int at = index.first[2] + k;
+    if (at == 9 || at == 10) kind(index.cell(i, j, k)) = NodeKind::inside;
+  });
+  grid.halo().exchange(kind);
+  solver.set_kinds(kind);
+  solver.begin_step(1);
+  // 36 cells in each of the nine layers before the plug
+  CHECK_THROWS_WITH(solver.solve(1, nullptr), Catch::Contains("close the channel") && Catch::Contains("324 fluid nodes") &&
+                                                  Catch::Contains("grid.nodes"));
 }
