@@ -250,9 +250,10 @@ void FluidSolver::fail_projection(double largest, double target) {
   throw ComputationError(fmt::format(
       "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
       "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "
-      "coupling.robin_coefficient_pg_per_um2_per_us), or prescribed velocities that do not conserve volume; also "
+      "coupling.robin_coefficient_pg_per_um2_per_us), {}or prescribed velocities that do not conserve volume; also "
       "fluid.max_iterations and fluid.divergence_tolerance",
-      target, largest, statistics_.pressure_iterations));
+      target, largest, statistics_.pressure_iterations,
+      skewed_ ? "a gap between body and wall too narrow for this skewed grid (grid.nodes), " : ""));
 }
 
 void FluidSolver::project(const EmbeddedBodies* bodies) {
