@@ -158,12 +158,12 @@ void level_diagonals(const LevelOperator<Real>& level, const bool (&closed)[3][2
 
 /// own = 0 but at `pinned` (padded cell number on the rank that owns it, -1 elsewhere), where it is as large as the
 /// conductances together: that fixes the level of an all-Neumann problem.
-inline void pin_level(const LevelOperator<double>& level, int pinned, const Array<CycleReal>& own) {
+inline void pin_level(const LevelOperator<CycleReal>& level, int pinned, const Array<CycleReal>& own) {
   Kokkos::deep_copy(Exec(), own, CycleReal(0));
   if (pinned < 0) return;
   const IndexSpace index = level.index;
   Kokkos::parallel_for("corpuscle::multigrid::pin", Policy(0, 1), KOKKOS_LAMBDA(int) {
-    double sum = 0;
+    CycleReal sum = 0;
     for (int d = 0; d < 3; ++d) sum += level.conductance[d](pinned) + level.conductance[d](pinned + index.stride(d));
     own(pinned) = sum;
   });

@@ -80,9 +80,6 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
   vector("velocity", state.u);
   vector("velocity_old", state.u_old);
   file.add("pressure", cell_shape(index, 1), cell_slab(index, 1), box_values(index, owned, state.p).data());
-  if (state.kind_at_setup.data())
-    file.add("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1),
-             box_integers(index, owned, state.kind_at_setup).data());
   for (int d = 0; d < 3; ++d) {
     const CellBox faces = face_range(index, d);
     file.add(flux_name(d), face_shape(index, d), face_slab(index, d), box_values(index, faces, state.flux[d]).data());
@@ -92,8 +89,8 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
   }
   const double numbers[3] = {state.reference_speed, progress.relaxation, simulation.step_us()};
   file.add("numbers", {3}, numbers);
-  const std::int64_t counts[3] = {state.history_levels, state.iterations_after_setup, state.last_iterations};
-  file.add("counts", {3}, counts);
+  const std::int64_t levels = state.history_levels;
+  file.add("history_levels", {1}, &levels);
   if (simulation.membranes()) {
     const auto membranes = simulation.membranes()->state();
     file.add("membranes", {membranes.size()}, membranes.data());
@@ -123,12 +120,6 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   std::vector<double> values(owned.size());
   file.read("pressure", cell_shape(index, 1), cell_slab(index, 1), values.data());
   set_box_values(index, owned, values, state.p);
-  if (state.kind_at_setup.data()) {
-    std::vector<std::int64_t> kinds(owned.size());
-    file.read("kind_at_setup", cell_shape(index, 1), cell_slab(index, 1), kinds.data());
-    Kokkos::deep_copy(state.kind_at_setup, simulation.grid().views().base_kind);
-    set_box_integers(index, owned, kinds, state.kind_at_setup);
-  }
   for (int d = 0; d < 3; ++d) {
     // Each rank also reads the faces on its upper side, which another rank wrote.
     CellBox faces = owned;
@@ -149,14 +140,12 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
     throw InputError(fmt::format("{}: written with time.step_us = {}, and this case has {}: second-order steps cannot "
                                  "change their length; use the same step",
                                  path, numbers[2], simulation.step_us()));
-  std::int64_t counts[3];
-  file.read("counts", {3}, counts);
+  std::int64_t levels = 0;
+  file.read("history_levels", {1}, &levels);
   state.reference_speed = numbers[0];
   state.time_us = file.header().time_us;
   state.step_us = numbers[2];
-  state.history_levels = static_cast<int>(counts[0]);
-  state.iterations_after_setup = static_cast<int>(counts[1]);
-  state.last_iterations = static_cast<int>(counts[2]);
+  state.history_levels = static_cast<int>(levels);
   if (simulation.membranes()) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());

@@ -62,35 +62,29 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
   for (auto& level : momentum_->cycle.levels())
     for (int d = 0; d < 3; ++d)
       for (int side = 0; side < 2; ++side) level.views.closed[d][side] = grid.halo().neighbour(d, side) < 0;
+  pressure_cycle_ = std::make_unique<PressureCycle>(*hierarchy_, settings.max_iterations);
   if (skewed_) {
-    kind_at_setup_ = Array<NodeKind>(uninitialised("corpuscle::fluid::kind_at_setup"), n);
-    Kokkos::deep_copy(kind_at_setup_, grid.views().base_kind);
     psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
     pressure_solver_ =
         std::make_unique<PressureSolver>(grid.comm(), grid.index(), grid.halo(), true, settings.max_iterations);
+    pressure_solver_->precondition_with(
+        [cycle = pressure_cycle_.get()](const Array<double>& b, const Array<double>& x) { cycle->apply(b, x); });
   } else {
-    multigrid_ = std::make_unique<PressureMultigrid>(*hierarchy_, g_.normal, settings.max_iterations);
+    multigrid_ =
+        std::make_unique<PressureMultigrid>(*hierarchy_, *pressure_cycle_, g_.normal, settings.max_iterations);
   }
-  fill_matrix(kind_);
+  update_pressure_equation();
 }
 
-void FluidSolver::fill_matrix(const Array<NodeKind>& kind) {
-  mark_pressure(kind, boundaries_.outflow(), mask_);
-  if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind);
+void FluidSolver::update_pressure_equation() {
+  mark_pressure(kind_, boundaries_.outflow(), mask_);
+  if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind_);
   hierarchy_->update(mask_);
-  if (multigrid_) return multigrid_->update(mask_, pinned_);
-  pressure_rows<true>(grid_->views(), g_.normal, kind, mask_, pressure_solver_->pattern(), pinned_,
+  pressure_cycle_->update(pinned_);
+  if (multigrid_) return multigrid_->update(mask_);
+  pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_solver_->pattern(), pinned_,
                       pressure_solver_->values());
   pressure_solver_->set_values();
-}
-
-/// The preconditioner is set up, when it is due, before the first solve with the new matrix: both then belong to the
-/// same node kinds, which is all a restart has to remember.
-void FluidSolver::update_matrix() {
-  fill_matrix(kind_);
-  if (multigrid_ || !pressure_solver_->setup_is_due()) return;
-  pressure_solver_->set_up();
-  Kokkos::deep_copy(kind_at_setup_, kind_);
 }
 
 KrylovResult FluidSolver::solve_pressure(double target) {
@@ -102,7 +96,7 @@ KrylovResult FluidSolver::solve_pressure(double target) {
 
 void FluidSolver::set_kinds(const Array<NodeKind>& kind) {
   kind_ = kind;
-  update_matrix();
+  update_pressure_equation();
 }
 
 void FluidSolver::set_body_force(const Components<double>& force, std::function<void(double)> update) {
@@ -265,7 +259,6 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   const IndexSpace& index = grid_->index();
   const double cells = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   const double share = std::max(1.0, 0.1 * std::sqrt(cells));
-  if (pressure_solver_ && pressure_solver_->setup_is_due()) update_matrix();
   // A round starts from the divergence that the corrected fluxes have, so its round-off is not that of the potential,
   // which an impulsive start makes large.
   constexpr int rounds = 4;
@@ -321,12 +314,8 @@ std::vector<int> FluidSolver::multigrid_cells() const {
 }
 
 FluidSolver::State FluidSolver::state() const {
-  State s{u_, u_old_, p_, {}, {}, kind_at_setup_, history_levels_, statistics_.reference_speed};
+  State s{u_, u_old_, p_, {}, {}, history_levels_, statistics_.reference_speed};
   for (int d = 0; d < 3; ++d) s.flux[d] = flux_[d], s.flux_old[d] = flux_old_[d];
-  if (pressure_solver_) {
-    s.iterations_after_setup = pressure_solver_->iterations_after_setup();
-    s.last_iterations = pressure_solver_->last_iterations();
-  }
   return s;
 }
 
@@ -345,7 +334,7 @@ FluidSolver::State FluidSolver::State::copy() const {
     Kokkos::deep_copy(own, view);
     view = own;
   };
-  clone_scalar(s.p), clone_scalar(s.kind_at_setup);
+  clone_scalar(s.p);
   for (int d = 0; d < 3; ++d) clone_scalar(s.flux[d]), clone_scalar(s.flux_old[d]);
   return s;
 }
@@ -367,13 +356,6 @@ void FluidSolver::restore(const State& state) {
   boundaries_.fill(u_old_);
   boundaries_.set_time(state.time_us);
   boundaries_.fill(u_);
-  if (!pressure_solver_ || !state.kind_at_setup.data()) return;
-  Kokkos::deep_copy(kind_at_setup_, state.kind_at_setup);
-  grid_->halo().exchange(kind_at_setup_);
-  fill_matrix(kind_at_setup_);
-  pressure_solver_->set_up();
-  pressure_solver_->resume(state.iterations_after_setup, state.last_iterations);
-  fill_matrix(kind_);
 }
 
 double FluidSolver::convection_over_viscosity() {

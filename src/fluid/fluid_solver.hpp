@@ -94,11 +94,9 @@ class FluidSolver {
     Components<double> u, u_old;
     Array<double> p;
     Array<double> flux[3], flux_old[3];   // flux_old only with convection
-    Array<NodeKind> kind_at_setup;        // skewed grids: node kinds when the pressure preconditioner was set up
     int history_levels = 0;               // how many earlier velocities are valid
     double reference_speed = 0;
     double time_us = 0, step_us = 0;      // of u, and from u_old to u: boundary velocities are those of these times
-    int iterations_after_setup = -1, last_iterations = 0;
     /// The same with memory of its own.
     State copy() const;
   };
@@ -107,8 +105,7 @@ class FluidSolver {
   void restore(const State& state);
 
  private:
-  void update_matrix();
-  void fill_matrix(const Array<NodeKind>& kind);
+  void update_pressure_equation();
   void fill_halos(const Components<double>& u);
   void assemble_history(double time_us);
   double momentum_residual();
@@ -142,7 +139,7 @@ class FluidSolver {
   Components<double> u_, u_old_, u_older_, work_, history_, grad_p_;
   Array<double> p_, p_old_, psi_field_, diagonal_;
   Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
-  Array<NodeKind> kind_, kind_at_setup_;
+  Array<NodeKind> kind_;
   PressureMask mask_;
   ViscousCoefficients g_;
   double residual_norm_ = 0;
@@ -161,6 +158,7 @@ class FluidSolver {
     Components<float> r, shadow, p, v, t;
   };
   std::unique_ptr<Momentum> momentum_;
+  std::unique_ptr<PressureCycle> pressure_cycle_;    // preconditioner of both
   std::unique_ptr<PressureMultigrid> multigrid_;     // orthogonal grids
   std::unique_ptr<PressureSolver> pressure_solver_;  // skewed ones
   Components<double> body_force_;

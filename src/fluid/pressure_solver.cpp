@@ -6,6 +6,7 @@
 #include <HYPRE_IJ_mv.h>
 #include <HYPRE_krylov.h>
 #include <HYPRE_parcsr_ls.h>
+#include <_hypre_parcsr_mv.h>
 #include <KokkosBlas1_nrm2_squared.hpp>
 #include <fmt/format.h>
 
@@ -23,6 +24,17 @@ namespace {
 
 /// hypre wants a set-up function; ours is called when we decide, not on every solve.
 HYPRE_Int keep_preconditioner(HYPRE_Solver, HYPRE_ParCSRMatrix, HYPRE_ParVector, HYPRE_ParVector) { return 0; }
+
+/// hypre's vectors as views, for a preconditioner of ours; `solver` is the function.
+HYPRE_Int call_preconditioner(HYPRE_Solver solver, HYPRE_ParCSRMatrix, HYPRE_ParVector b, HYPRE_ParVector x) {
+  const auto view = [](HYPRE_ParVector vector) {
+    auto* local = hypre_ParVectorLocalVector(reinterpret_cast<hypre_ParVector*>(vector));
+    return Array<double>(hypre_VectorData(local), hypre_VectorSize(local));
+  };
+  (*reinterpret_cast<std::function<void(const Array<double>&, const Array<double>&)>*>(solver))(view(b), view(x));
+  Exec().fence();
+  return 0;
+}
 
 void start_hypre_once() {
   static bool started = false;
@@ -137,23 +149,17 @@ void PressureSolver::set_values() {
   HYPRE_IJMatrixGetObject(hypre_->matrix, reinterpret_cast<void**>(&hypre_->a));
 }
 
-bool PressureSolver::setup_is_due() const {
-  constexpr int growth = 4;  // a set-up costs about as much as this many iterations
-  return !hypre_->amg || (iterations_after_setup_ >= 0 && last_iterations_ > iterations_after_setup_ + growth);
-}
-
-void PressureSolver::resume(int iterations_after_setup, int last_iterations) {
-  iterations_after_setup_ = iterations_after_setup;
-  last_iterations_ = last_iterations;
-}
-
 void PressureSolver::set_up() {
   if (hypre_->amg) HYPRE_BoomerAMGDestroy(hypre_->amg);
   hypre_->amg = make_boomer_amg();
   HYPRE_BoomerAMGSetup(hypre_->amg, hypre_->a, hypre_->b, hypre_->y);
   HYPRE_ParCSRFlexGMRESSetPrecond(hypre_->gmres, HYPRE_BoomerAMGSolve, keep_preconditioner, hypre_->amg);
-  ++setups_;
-  iterations_after_setup_ = -1;
+}
+
+void PressureSolver::precondition_with(std::function<void(const Array<double>&, const Array<double>&)> apply) {
+  preconditioner_ = std::move(apply);
+  HYPRE_ParCSRFlexGMRESSetPrecond(hypre_->gmres, call_preconditioner, keep_preconditioner,
+                                  reinterpret_cast<HYPRE_Solver>(&preconditioner_));
 }
 
 void PressureSolver::load(const Array<double>& rhs, const Array<double>& x) {
@@ -198,12 +204,6 @@ KrylovResult PressureSolver::solve(const Array<double>& rhs, const Array<double>
   HYPRE_FlexGMRESGetConverged(hypre_->gmres, &converged);
   result.iterations = iterations;
   result.converged = converged != 0;
-  // Solves differ in how far they go: what a set-up is worth shows in the iterations that ten digits would take.
-  const double digits = std::log10(start / tolerance);
-  if (digits >= 1) {
-    last_iterations_ = static_cast<int>(std::lround(10 * iterations / digits));
-    if (iterations_after_setup_ < 0) iterations_after_setup_ = last_iterations_;
-  }
   HYPRE_IJVectorGetValues(hypre_->x, rows_, row_.data(), x.data());
   return result;
 }

@@ -1,16 +1,17 @@
-// A pressure equation given as matrix rows: flexible GMRES preconditioned by hypre's BoomerAMG, or one cycle of that.
+// A pressure equation given as matrix rows: hypre's flexible GMRES, and its BoomerAMG.
 #pragma once
 
 #include "fluid/bicgstab.hpp"
 #include "fluid/pressure_matrix.hpp"
 #include "parallel/halo.hpp"
 
+#include <functional>
 #include <memory>
 
 namespace corpuscle {
 
 /// The matrix keeps its sparsity for the whole run: rows of nodes that are not fluid hold only a diagonal. So a change
-/// of the immersed nodes changes values only, and the preconditioner is set up again only when iterations have grown.
+/// of the immersed nodes changes values only.
 class PressureSolver {
  public:
   /// @param skewed  rows of 19 entries, not 7
@@ -30,16 +31,10 @@ class PressureSolver {
   /// x = one BoomerAMG cycle from zero, a symmetric operator. @pre set_up()
   void cycle(const Array<double>& rhs, const Array<double>& x);
 
-  /// Whether there is no preconditioner yet, or iterations have grown since the last set-up.
-  bool setup_is_due() const;
-  /// Set the preconditioner up for the matrix as it is now. @pre set_values()
+  /// Precondition with BoomerAMG for the matrix as it is now. @pre set_values()
   void set_up();
-  int setups() const { return setups_; }
-
-  /// Counts on which the next set-up depends, for checkpoints.
-  int iterations_after_setup() const { return iterations_after_setup_; }
-  int last_iterations() const { return last_iterations_; }
-  void resume(int iterations_after_setup, int last_iterations);
+  /// Precondition with `apply(b, x)` instead, on compact vectors.
+  void precondition_with(std::function<void(const Array<double>&, const Array<double>&)> apply);
 
  private:
   struct Hypre;
@@ -52,8 +47,9 @@ class PressureSolver {
   Table<int> slot_;       // [row, entry] position in the packed arrays, -1 for no entry
   Array<double> packed_;  // coefficients as hypre takes them
   Array<int> row_, column_, row_length_;
+  std::function<void(const Array<double>&, const Array<double>&)> preconditioner_;
   bool krylov_ready_ = false;
-  int rows_ = 0, setups_ = 0, iterations_after_setup_ = -1, last_iterations_ = 0;
+  int rows_ = 0;
 };
 
 }  // namespace corpuscle

@@ -52,11 +52,6 @@ void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vec
   scatter_vectors(index, box, to_buffer(values), field);
 }
 
-void set_box_integers(const IndexSpace& index, const CellBox& box, const std::vector<std::int64_t>& values,
-                      const Array<NodeKind>& kind) {
-  scatter_box(index, box, to_buffer(values), kind);
-}
-
 std::vector<double> vertex_values(int count, const Components<double>& field) {
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);
   std::vector<double> values(3 * static_cast<std::size_t>(count));

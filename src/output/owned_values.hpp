@@ -18,8 +18,6 @@ void set_box_values(const IndexSpace& index, const CellBox& box, const std::vect
                     const Array<double>& field);
 void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vector<double>& values,
                      const Components<double>& field);
-void set_box_integers(const IndexSpace& index, const CellBox& box, const std::vector<std::int64_t>& values,
-                      const Array<NodeKind>& kind);
 
 /// [vertex, 3] values of the first `count` vertices.
 std::vector<double> vertex_values(int count, const Components<double>& field);

@@ -31,7 +31,7 @@ std::map<std::string, double> differences(const History& a, const History& b) {
 
 #ifdef CORPUSCLE_HDF5
 constexpr const char* state_sets[] = {"velocity", "velocity_old", "pressure",  "flux_i", "flux_j",
-                                      "flux_k",   "membranes",    "locations", "counts", "numbers"};
+                                      "flux_k",   "membranes",    "locations", "history_levels", "numbers"};
 
 /// The states in two checkpoints are the same to the last bit.
 void require_same_state(const fs::path& a, const fs::path& b, bool cell) {

@@ -42,8 +42,10 @@ Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const st
   mark_pressure(kind, outflow, mask);
   MultigridHierarchy hierarchy(grid, g.normal);
   hierarchy.update(mask);
-  PressureMultigrid solver(hierarchy, g.normal, 100);
-  solver.update(mask, with_outflow || !comm.root() ? -1 : index.cell(0, 0, 0));
+  PressureCycle cycle(hierarchy, 100);
+  cycle.update(with_outflow || !comm.root() ? -1 : index.cell(0, 0, 0));
+  PressureMultigrid solver(hierarchy, cycle, g.normal, 100);
+  solver.update(mask);
 
   const Array<double> psi("corpuscle::test::psi", size), rhs("corpuscle::test::rhs", index.owned());
   Array<double> flux[3];

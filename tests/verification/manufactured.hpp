@@ -154,7 +154,6 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
   set_face_flux(views, flow, 0, start.flux);
   if (start.flux_old[0].data()) set_face_flux(views, flow, -dt, start.flux_old);
   start.history_levels = 1;
-  start.kind_at_setup = {};
   solver.restore(start);
   Errors errors;
   for (int n = 1; n <= steps; ++n) {
