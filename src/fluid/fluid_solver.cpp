@@ -80,6 +80,7 @@ void FluidSolver::update_pressure_equation() {
   mark_pressure(kind_, boundaries_.outflow(), mask_);
   if (!boundaries_.has_outflow()) pinned_ = cell_to_pin(*grid_, kind_);
   hierarchy_->update(mask_);
+  momentum_->stale = true;
   pressure_cycle_->update(pinned_);
   if (multigrid_) return multigrid_->update(mask_);
   pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_solver_->pattern(), pinned_,
@@ -139,10 +140,7 @@ void FluidSolver::begin_step(double dt) {
   mass1_ = rho * (second_order ? 2.0 : 1.0) / dt;
   mass2_ = rho * (second_order ? -0.5 : 0.0) / dt;
   momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
-  if (mass_ != momentum_->mass) {
-    momentum_->depth = momentum_depth();
-    momentum_->mass = mass_;
-  }
+  if (mass_ != momentum_->mass) momentum_->mass = mass_, momentum_->stale = true;
   // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
   if (second_order)
     extrapolate(u_old_, u_older_, u_);

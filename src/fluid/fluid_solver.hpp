@@ -118,7 +118,7 @@ class FluidSolver {
   class Correction;
   template <class Use>
   void with_operator(const Use& use) const;
-  double find_residual();
+  double residual_square();
   void update_momentum_cycle();
   int momentum_depth() const;
   template <class Velocity>
@@ -153,8 +153,9 @@ class FluidSolver {
       for (auto* field : {&r, &shadow, &p, &v, &t}) *field = Components<float>("corpuscle::fluid::krylov", nodes, 3);
     }
     MultigridCycle<Components<CycleReal>> cycle;
-    int depth = 0;     // coarser levels in use
-    double mass = -1;  // for which they are
+    int depth = 0;      // coarser levels in use
+    double mass = -1;   // of the present step
+    bool stale = true;  // the cycle is of another step's mass or other node kinds
     Components<float> r, shadow, p, v, t;
   };
   std::unique_ptr<Momentum> momentum_;

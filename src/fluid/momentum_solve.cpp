@@ -97,25 +97,26 @@ class FluidSolver::Correction {
   const EmbeddedBodies* bodies_;
 };
 
-/// Momentum residual with the present pressure and velocity, um/us: 2-norm over nodes.
-double FluidSolver::find_residual() {
+/// Square of this rank's momentum residual with the present pressure and velocity, (um/us)^2, summed over nodes.
+double FluidSolver::residual_square() {
   double square = 0;
   with_operator([&](const auto& a) {
     square = corpuscle::momentum_residual(a, mu_, history_, grad_p_, u_, momentum_->cycle.levels()[0].views.inverse,
                                           momentum_->r);
   });
-  return std::sqrt(grid_->comm().sum(square));
+  return square;
 }
 
-/// The same over the 2-norm of the velocity.
+/// The residual's 2-norm over all nodes, kept in residual_norm_, over that of the velocity.
 double FluidSolver::momentum_residual() {
   const auto scope = timers_->scope("momentum");
   grid_->halo().exchange(p_);
   pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_);
-  residual_norm_ = find_residual();
-  const double square = grid_->comm().sum(square_of(grid_->index(), u_));
+  double squares[2] = {residual_square(), square_of(grid_->index(), u_)};
+  grid_->comm().sum(squares, 2);
+  residual_norm_ = std::sqrt(squares[0]);
   const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
-  return residual_norm_ / std::sqrt(std::max(square, floor));
+  return residual_norm_ / std::sqrt(std::max(squares[1], floor));
 }
 
 /// Corrections until the residual is small enough, each of at most four digits: single precision has no more to give. Several
@@ -134,7 +135,7 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
     if (result.iterations == 0) break;  // not finite in single precision
     iterations += result.iterations;
     complete_velocity(bodies);
-    residual_norm_ = find_residual();
+    residual_norm_ = std::sqrt(grid_->comm().sum(residual_square()));
   }
   statistics_.momentum_iterations += iterations;
   if (!(residual_norm_ <= target))
@@ -145,8 +146,11 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
         iterations, size > 0 ? residual_norm_ / size : residual_norm_, settings_.momentum_tolerance));
 }
 
-/// The cycle's equation for the present mass and node kinds, after the hierarchy's update.
+/// The cycle's equation for the present mass and node kinds, where they changed; after the hierarchy's update.
 void FluidSolver::update_momentum_cycle() {
+  if (!momentum_->stale) return;
+  momentum_->stale = false;
+  momentum_->depth = momentum_depth();
   auto& finest = momentum_->cycle.levels()[0];
   velocity_own_diagonal(grid_->views(), g_, kind_, mass_ / mu_, boundaries_.natural(), finest.own);
   momentum_->cycle.update();

@@ -20,58 +20,69 @@ double inverse(const std::vector<double>& table, double value) {
 
 }  // namespace
 
+/// The latitude further by a small angle (its tangent is taken for it), between the poles.
+RevolvedShape::Latitude RevolvedShape::turned(const Latitude& from, double angle) {
+  const double s = from.sin + angle * from.cos, c = from.cos - angle * from.sin;
+  if (s <= 0) return {0, c < 0 ? -1.0 : 1.0};
+  const double scale = 1 / std::sqrt(s * s + c * c);
+  return {scale * s, scale * c};
+}
+
 void RevolvedShape::tabulate() {
   const int entries = 4001;
   share_.assign(entries, 0);
   const double step = pi / (entries - 1);
   for (int e = 1; e < entries; ++e) {
-    const Meridian m = meridian((e - 0.5) * step);
+    const Meridian m = meridian(latitude((e - 0.5) * step));
     share_[e] = share_[e - 1] + 2 * pi * m.r * std::hypot(m.dr, m.dz) * step;
     volume_ -= pi * m.r * m.r * m.dz * step;
   }
   area_ = share_.back();
   for (double& s : share_) s /= area_;
-  const int samples = 41;
-  for (int e = 0; e < samples; ++e) {
-    const double phi = pi * e / (samples - 1);
-    const Meridian m = meridian(phi);
-    sample_.push_back({m.r, m.z, phi});
+  // The meridian by its direction from the centre, of which it is a function since the surface is star-like.
+  std::vector<double> bearing(entries);
+  for (int e = 0; e < entries; ++e) {
+    const Meridian m = meridian(latitude(e * step));
+    bearing[e] = 1 - m.z / (std::abs(m.z) + m.r);
   }
+  const int directions = 1025;
+  for (int d = 0; d < directions; ++d) seen_.push_back(latitude(inverse(bearing, 2.0 * d / (directions - 1)) * step));
 }
 
 Vec3 RevolvedShape::from_sphere(const Vec3& direction) const {
   const double phi = inverse(share_, 0.5 * (1 - direction.z)) * pi / double(share_.size() - 1);
-  const Meridian m = meridian(phi);
+  const Meridian m = meridian(latitude(phi));
   const double ring = std::hypot(direction.x, direction.y);
   if (ring == 0) return {0, 0, m.z};
   return {m.r * direction.x / ring, m.r * direction.y / ring, m.z};
 }
 
 Vec3 RevolvedShape::project(const Vec3& point) const {
-  const double r = std::hypot(point.x, point.y);
-  const auto distance2 = [&](double a, double b) { return (a - r) * (a - r) + (b - point.z) * (b - point.z); };
-  double phi = 0, nearest = 1e300;
-  for (const Vec3& s : sample_) {
-    const double d = distance2(s.x, s.y);
-    if (d < nearest) nearest = d, phi = s.z;
-  }
-  // Newton on the derivative of the squared distance, from the nearest sample.
+  const double r = std::sqrt(point.x * point.x + point.y * point.y);
+  const double size = std::abs(point.z) + r;
+  const double entry = size > 0 ? 0.5 * (1 - point.z / size) * double(seen_.size() - 1) : 0;
+  const std::size_t below = std::min(std::size_t(entry), seen_.size() - 2);
+  const double part = entry - double(below);
+  Latitude at = turned({seen_[below].sin + part * (seen_[below + 1].sin - seen_[below].sin),
+                        seen_[below].cos + part * (seen_[below + 1].cos - seen_[below].cos)},
+                       0);
+  // Newton on the derivative of the squared distance, from the point in the same direction from the centre.
   for (int i = 0; i < 6; ++i) {
-    const Meridian m = meridian(phi);
+    const Meridian m = meridian(at);
     const double slope = (m.r - r) * m.dr + (m.z - point.z) * m.dz;
     const double curvature = m.dr * m.dr + m.dz * m.dz + (m.r - r) * m.ddr + (m.z - point.z) * m.ddz;
     if (!(curvature > 0)) break;
     const double change = slope / curvature;
-    phi = std::clamp(phi - change, 0.0, pi);
-    if (std::abs(change) < 1e-14) break;
+    at = turned(at, -change);
+    if (std::abs(change) < 1e-8) break;  // squared, the error after the step
   }
-  const Meridian m = meridian(phi);
+  const Meridian m = meridian(at);
   if (r == 0) return {m.r, 0, m.z};
   return {m.r * point.x / r, m.r * point.y / r, m.z};
 }
 
-RevolvedShape::Meridian BiconcaveShape::meridian(double phi) const {
-  const double s = std::sin(phi), c = std::cos(phi);
+RevolvedShape::Meridian BiconcaveShape::meridian(const Latitude& latitude) const {
+  const auto [s, c] = latitude;
   const double q = 0.25 * s * s, dq = 0.5 * s * c, ddq = 0.5 * (c * c - s * s);
   const double f = a0 + q * (a1 + q * a2), df = a1 + 2 * a2 * q;
   const double f1 = df * dq, f2 = 2 * a2 * dq * dq + df * ddq;  // derivatives of f to phi

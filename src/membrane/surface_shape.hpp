@@ -1,6 +1,7 @@
 // The smooth surfaces that meshes are generated on.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "common/vec3.hpp"
@@ -34,17 +35,23 @@ class RevolvedShape : public SurfaceShape {
   Vec3 project(const Vec3& point) const override;
 
  protected:
+  struct Latitude {
+    double sin, cos;  // of phi
+  };
   struct Meridian {
     double r, z, dr, dz, ddr, ddz;  // and first and second derivatives to phi
   };
-  virtual Meridian meridian(double phi) const = 0;
+  virtual Meridian meridian(const Latitude& latitude) const = 0;
 
   /// Tabulate the area above each phi; to be called by the constructor of the final class.
   void tabulate();
 
  private:
-  std::vector<double> share_;  // [entry] share of the area above phi = pi entry / (entries - 1)
-  std::vector<Vec3> sample_;   // [entry] (r, z, phi) to start the search for the closest point
+  static Latitude latitude(double phi) { return {std::sin(phi), std::cos(phi)}; }
+  static Latitude turned(const Latitude& from, double angle);
+
+  std::vector<double> share_;   // [entry] share of the area above phi = pi entry / (entries - 1)
+  std::vector<Latitude> seen_;  // [entry] where the ray with 1 - z / (|z| + r) = 2 entry / (entries - 1) meets the surface
 };
 
 /// Equation 1: z = +-D0 sqrt(1 - 4 q) (a0 + a1 q + a2 q^2), q = (r/D0)^2, with r = D0/2 sin(phi).
@@ -54,7 +61,7 @@ class BiconcaveShape final : public RevolvedShape {
   BiconcaveShape() { tabulate(); }
 
  protected:
-  Meridian meridian(double phi) const override;
+  Meridian meridian(const Latitude& latitude) const override;
 };
 
 class EllipsoidShape final : public SurfaceShape {
