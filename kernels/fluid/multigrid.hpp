@@ -177,6 +177,9 @@ inline double sum_conductances(const MultigridLevel& level, int d) {
                    KOKKOS_LAMBDA(int i, int j, int k) { return g(index.cell(i, j, k)); });
 }
 
+// The kernels of the cycle also run for halo cells behind each line (for_owned_rounded): beyond a physical side inverse is
+// zero, which leaves their x at zero; beyond another rank's side x is exchanged before it is read.
+
 /// previous, x = the first and the second Chebyshev iterate from zero.
 template <class Field>
 void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& first,
@@ -187,7 +190,7 @@ void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& f
   const auto inverse = level.inverse;
   const auto g0 = level.conductance[0], g1 = level.conductance[1], g2 = level.conductance[2];
   const int s1 = index.stride(1), s2 = index.stride(2);
-  for_owned(cycle_label<Field>("smooth_from_zero"), index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("smooth_from_zero"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const auto scaled = inverse(c) * value_at(b, c);
     const auto around = g0(c) * inverse(c - 1) * value_at(b, c - 1) + g0(c + 1) * inverse(c + 1) * value_at(b, c + 1) +
@@ -205,7 +208,7 @@ void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const
             const Field& previous) {
   const IndexSpace index = level.index;
   const CycleReal momentum = step.momentum, weight = step.weight;
-  for_owned(cycle_label<Field>("smooth"), index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("smooth"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const auto here = value_at(x, c);
     set_value(previous, c, here + momentum * (here - value_at(previous, c)) +
@@ -217,7 +220,7 @@ void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const
 template <class Field>
 void level_residual(const MultigridLevel& level, const Field& b, const Field& x, const Field& residual) {
   const IndexSpace index = level.index;
-  for_owned(cycle_label<Field>("residual"), index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("residual"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
     set_value(residual, c, unknown * (value_at(b, c) - level.apply(x, c)));
@@ -231,7 +234,7 @@ void add_correction(const MultigridLevel& level, const IndexSpace& coarse, const
   // Factors are 1 or 2: shifts of bits for divisions, which would keep the loop from vectorising.
   const int b0 = level.factor[0] - 1, b1 = level.factor[1] - 1, b2 = level.factor[2] - 1;
   const int o0 = level.factor[0] - level.shift[0], o1 = level.factor[1] - level.shift[1], o2 = level.factor[2] - level.shift[2];
-  for_owned(cycle_label<Field>("prolong"), index, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("prolong"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const int from = coarse.cell(((i + o0) >> b0) - 1, ((j + o1) >> b1) - 1, ((k + o2) >> b2) - 1);
     const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);

@@ -59,6 +59,29 @@ enum class NodeKind : std::int8_t {
 #define CORPUSCLE_INLINE_ALL
 #endif
 
+/// One thread's share of the lines of cells along i that make up a box.
+class LineShare {
+ public:
+  LineShare(const std::array<int, 3>& lower, const std::array<int, 3>& upper, int thread, int threads)
+      : lower_j_(lower[1]), upper_j_(upper[1]) {
+    const int wide = upper[1] - lower[1];
+    const long lines = static_cast<long>(wide) * (upper[2] - lower[2]);
+    const int first = static_cast<int>(lines * thread / threads);
+    left_ = static_cast<int>(lines * (thread + 1) / threads) - first;
+    j = lower[1] + first % wide, k = lower[2] + first / wide;
+  }
+  bool any() const { return left_ > 0; }
+  void next() {
+    --left_;
+    if (++j == upper_j_) j = lower_j_, ++k;
+  }
+
+  int j, k;
+
+ private:
+  int left_, lower_j_, upper_j_;
+};
+
 /// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper. Cells must be independent of each other: on
 /// the host each line of cells along i is a vectorised loop.
 template <class Body>
@@ -70,14 +93,18 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
                                       Kokkos::IndexType<int>>;
   Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
 #else
-  const int ni = lower[0], ui = upper[0], nj = upper[1] - lower[1], lj = lower[1], lk = lower[2];
-  Kokkos::parallel_for(label, Policy(0, nj * (upper[2] - lk)), [=](int line) CORPUSCLE_INLINE_ALL {
-    const int j = lj + line % nj, k = lk + line / nj;
+  // One iteration a thread: what a line costs beside its cells is soon as much as the cells of a short one.
+  const int threads = Exec().concurrency();
+  Kokkos::parallel_for(label, Policy(0, threads), [=](int thread) CORPUSCLE_INLINE_ALL {
     const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
+    const int begin = lower[0], end = upper[0];
+    for (LineShare line(lower, upper, thread, threads); line.any(); line.next()) {
+      const int j = line.j, k = line.k;
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC ivdep
 #endif
-    for (int i = ni; i < ui; ++i) cell(i, j, k);
+      for (int i = begin; i < end; ++i) cell(i, j, k);
+    }
   });
 #endif
 }
@@ -86,6 +113,18 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
 template <class Body>
 void for_owned(const std::string& label, const IndexSpace& index, const Body& body) {
   for_box(label, {0, 0, 0}, {index.n[0], index.n[1], index.n[2]}, body);
+}
+
+/// The same where it does no harm to run it for up to three cells of the halo behind each line too: on the host lines are
+/// made up to a multiple of four, since the cells left over when the vectors are full cost as much as the others.
+template <class Body>
+void for_owned_rounded(const std::string& label, const IndexSpace& index, const Body& body) {
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  for_owned(label, index, body);
+#else
+  static_assert(IndexSpace::halo >= 3);
+  for_box(label, {0, 0, 0}, {(index.n[0] + 3) / 4 * 4, index.n[1], index.n[2]}, body);
+#endif
 }
 
 /// Sum of `body(i, j, k)` over this rank's owned cells. The order of summation depends on the number of threads only.
@@ -100,16 +139,20 @@ double sum_owned(const std::string& label, const IndexSpace& index, const Body& 
       },
       sum);
 #else
-  const int ni = index.n[0], nj = index.n[1];
+  const std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
+  const int threads = Exec().concurrency();
   Kokkos::parallel_reduce(
-      label, Policy(0, nj * index.n[2]),
-      [=](int line, double& total) CORPUSCLE_INLINE_ALL {
-        const int j = line % nj, k = line / nj;
+      label, Policy(0, threads),
+      [=](int thread, double& total) CORPUSCLE_INLINE_ALL {
         const Body cell = body;
-        double part = 0;
+        const int end = upper[0];
+        for (LineShare line({0, 0, 0}, upper, thread, threads); line.any(); line.next()) {
+          const int j = line.j, k = line.k;
+          double part = 0;
 #pragma omp simd reduction(+ : part)
-        for (int i = 0; i < ni; ++i) part += cell(i, j, k);
-        total += part;
+          for (int i = 0; i < end; ++i) part += cell(i, j, k);
+          total += part;
+        }
       },
       sum);
 #endif
