@@ -315,18 +315,19 @@ inline void next_direction(const IndexSpace& index, double beta, double w, const
   });
 }
 
-/// result = 2 a - b over whole fields, halos included.
-inline void extrapolate(const Components<double>& a, const Components<double>& b, const Components<double>& result) {
+/// result = a + ratio (a - b) over whole fields, halos included.
+inline void extrapolate(double ratio, const Components<double>& a, const Components<double>& b,
+                        const Components<double>& result) {
   const int n = static_cast<int>(a.extent(0));
   Kokkos::parallel_for("corpuscle::fluid::extrapolate", Policy(0, n), KOKKOS_LAMBDA(int c) {
-    for (int m = 0; m < 3; ++m) result(c, m) = 2 * a(c, m) - b(c, m);
+    for (int m = 0; m < 3; ++m) result(c, m) = (1 + ratio) * a(c, m) - ratio * b(c, m);
   });
 }
 
-inline void extrapolate(const Array<double>& a, const Array<double>& b, const Array<double>& result) {
+inline void extrapolate(double ratio, const Array<double>& a, const Array<double>& b, const Array<double>& result) {
   const int n = static_cast<int>(a.extent(0));
   Kokkos::parallel_for("corpuscle::fluid::extrapolate", Policy(0, n),
-                       KOKKOS_LAMBDA(int c) { result(c) = 2 * a(c) - b(c); });
+                       KOKKOS_LAMBDA(int c) { result(c) = (1 + ratio) * a(c) - ratio * b(c); });
 }
 
 }  // namespace corpuscle

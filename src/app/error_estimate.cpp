@@ -43,6 +43,8 @@ CoarserRun longer_step(const Case& scene) {
   if (ratio > steps) refuse("step", "the run is a single step");
   CoarserRun run{"step", double(ratio), {}};
   run.overrides.push_back(fmt::format("time.step_us={:.15g}", scene.time.step_us * ratio));
+  if (scene.time.first_step_us > 0)
+    run.overrides.push_back(fmt::format("time.first_step_us={:.15g}", scene.time.first_step_us * ratio));
   return run;
 }
 

@@ -63,7 +63,7 @@ FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulat
 bool FlowOutput::due(double every_us) const {
   if (simulation_.done()) return true;
   if (every_us <= 0) return false;
-  const double step = scene_.time.step_us, now = simulation_.time();
+  const double step = simulation_.last_step_us(), now = simulation_.time();
   return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
 }
 
@@ -285,7 +285,7 @@ void FlowOutput::fill(Report& report) {
     const auto& s = simulation_.stability();
     report.extra["stability"] = {{"mass_term_pg_per_um2_per_us", s.mass_term},
                                  {"beta_pg_per_um2_per_us", s.beta},
-                                 {"threshold_pg_per_um2_per_us", s.threshold},
+                                 {"threshold_pg_per_um2_per_us", s.threshold()},
                                  {"margin", s.margin()}};
   }
   fill_energy(report);

@@ -73,8 +73,8 @@ Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
     info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
-         s.mass_term, s.beta, s.threshold, s.margin());
-    const int substeps = simulation.membranes()->substeps(scene.time.step_us, s.beta);
+         s.mass_term, s.beta, s.threshold(), s.margin());
+    const int substeps = simulation.membranes()->substeps(simulation.next_step_us(), s.beta);
     if (substeps > 1)
       info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
            simulation.membranes()->stable_step_us());
@@ -97,7 +97,7 @@ Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   output.started_from(options.restart);
   if (!restart_us) output.after_step(true);
   Report report = start_report(comm, scene);
-  Progress progress(scene.time.end_us, simulation.total_steps() - simulation.steps());
+  Progress progress(scene.time.end_us, simulation.steps_left());
   const long first = simulation.steps();
   try {
     while (!simulation.done()) {
@@ -108,7 +108,7 @@ Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   } catch (const ComputationError& error) {
     progress.finish();
     throw ComputationError(fmt::format(
-        "at {:.6g} us (step {}): {}. Last good checkpoint: {}", simulation.time() + scene.time.step_us,
+        "at {:.6g} us (step {}): {}. Last good checkpoint: {}", simulation.time() + simulation.next_step_us(),
         simulation.steps() + 1, error.what(),
         output.last_checkpoint().empty() ? "none yet (output.checkpoint_every_us)" : output.last_checkpoint()));
   }
@@ -270,17 +270,17 @@ void check_case(const Comm& comm, const RunOptions& options) {
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
-         s.margin(), s.mass_term, s.beta, s.threshold);
+         s.margin(), s.mass_term, s.beta, s.threshold());
     auto& membranes = *simulation.membranes();
     const double stable = membranes.stable_step_us();
     info("membrane: undamped stable step {:.3g} us, {} sub-steps a step", stable,
-         membranes.substeps(scene.time.step_us, s.beta));
+         membranes.substeps(simulation.next_step_us(), s.beta));
   }
   // Seconds per cell and step on one core, measured with the tube; about ten times that on skewed grids.
   const double rate = simulation.grid().orthogonal() ? 1.1e-6 : 1e-5;
   const double cores = static_cast<double>(comm.size()) * thread_count();
-  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", comm.sum(peak_rss_mb()), simulation.total_steps(),
-       rate * nodes * simulation.total_steps() / cores);
+  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", comm.sum(peak_rss_mb()), simulation.steps_left(),
+       rate * nodes * simulation.steps_left() / cores);
   info("{} is valid", scene.path);
 }
 

@@ -32,12 +32,9 @@ FluidSettings fluid_settings(const Case& scene) {
 
 }  // namespace
 
-FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers) : scene_(scene), timers_(timers) {
+FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers)
+    : scene_(scene), timers_(timers), schedule_(scene.time) {
   const auto scope = timers_.scope("set-up");
-  total_steps_ = std::llround(scene.time.end_us / scene.time.step_us);
-  if (std::abs(total_steps_ * scene.time.step_us - scene.time.end_us) > 1e-9 * scene.time.end_us)
-    throw InputError(fmt::format("time.end_us = {} is not a whole number of steps of {} us (time.step_us); use {}",
-                                 scene.time.end_us, scene.time.step_us, total_steps_ * scene.time.step_us));
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (scene.cells.empty() && scene.bodies.empty()) return;
@@ -46,7 +43,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   if (rigid_bodies_) fluid_->raise_reference_speed(rigid_bodies_->largest_speed());
   check_start();
   if (!membranes_) return;
-  estimate_stability();
+  measure_stability();
   const int vertices = membranes_->vertices();
   x_start_ = Components<double>("corpuscle::coupling::x_start", vertices, 3);
   v_interface_ = Components<double>("corpuscle::coupling::v_interface", vertices, 3);
@@ -90,32 +87,44 @@ void FlowSimulation::check_start() {
 /// rho c / dt with c the added mass over the cell's area: for a disk that moves along its axis 8/3 R^3 / A (Lamb,
 /// Hydrodynamics, section 102) in free fluid; measured in a tube of 10 um, by bisection on the mass at dt = 0.1 us, on the
 /// step and on the viscosity: twice that.
-void FlowSimulation::estimate_stability() {
-  constexpr double confined = 2.0, room = 2.0;
+StabilityEstimate FlowSimulation::stability_of(double dt) const {
+  constexpr double room = 2.0;
   const auto& coupling = *scene_.coupling;
-  const double h = immersed_->smallest_spacing_at_surfaces(), mu = fluid_->viscosity(), dt = scene_.time.step_us;
-  double mass_term = 1e300, added = 0;
+  const double viscous = 2 * fluid_->viscosity() / smallest_spacing_, inertial = 0.75 * added_mass_per_area_ / dt;
+  const bool robin = coupling.scheme == CouplingSettings::Scheme::robin ||
+                     (coupling.scheme == CouplingSettings::Scheme::aitken && coupling.robin_in_aitken);
+  const double beta = coupling.robin_coefficient >= 0
+                          ? coupling.robin_coefficient
+                          : std::max(fluid_->viscosity() * std::acos(-1.0) / smallest_spacing_, room * inertial);
+  return {least_mass_per_area_ / dt, robin ? beta : 0.0, viscous, inertial};
+}
+
+/// What stability_of() needs; refuses a coupling that cannot be stable with one of the schedule's steps.
+void FlowSimulation::measure_stability() {
+  constexpr double confined = 2.0;
+  smallest_spacing_ = immersed_->smallest_spacing_at_surfaces();
   const auto cells = membranes_->diagnostics();
   for (int c = 0; c < membranes_->cells(); ++c) {
     const Triple extent = cells[c].extent_um();
     const double radius = 0.5 * std::max({extent[0], extent[1], extent[2]});
-    mass_term = std::min(mass_term, scene_.cells[c].mass_pg / (cells[c].rest_area_um2 * dt));
-    added = std::max(added, confined * 8.0 / 3 * std::pow(radius, 3) / cells[c].rest_area_um2);
+    least_mass_per_area_ = std::min(least_mass_per_area_, scene_.cells[c].mass_pg / cells[c].rest_area_um2);
+    added_mass_per_area_ =
+        std::max(added_mass_per_area_, scene_.fluid->density_pg_per_um3 * confined * 8.0 / 3 * std::pow(radius, 3) / cells[c].rest_area_um2);
   }
-  const double inertial = 0.75 * scene_.fluid->density_pg_per_um3 * added / dt;
-  const bool robin = coupling.scheme == CouplingSettings::Scheme::robin ||
-                     (coupling.scheme == CouplingSettings::Scheme::aitken && coupling.robin_in_aitken);
-  const double beta = coupling.robin_coefficient >= 0 ? coupling.robin_coefficient
-                                                      : std::max(mu * std::acos(-1.0) / h, room * inertial);
-  stability_ = {mass_term, robin ? beta : 0.0, std::max(2 * mu / h, inertial)};
-  if (coupling.scheme != CouplingSettings::Scheme::aitken && stability_.margin() < 1)
-    throw InputError(fmt::format(
-        "coupling: M / (A dt) + beta = {:.3g} + {:.3g} pg/um2/us is below {:.3g}, half the fluid's reaction (the larger of "
-        "2 mu / h = {:.3g}, to the shortest membrane wave the grid resolves, and 3/4 of the fluid carried along over the "
-        "step, {:.3g}), so this run would diverge. Use coupling.scheme = \"robin\" with its default coefficient, or a "
-        "cell of at least {:.3g} pg (cells.0.mass_pg), or coupling.scheme = \"aitken\"",
-        mass_term, stability_.beta, stability_.threshold, 2 * mu / h, inertial,
-        (stability_.threshold - stability_.beta) / mass_term * scene_.cells[0].mass_pg));
+  stability_ = stability_of(next_step_us());
+  if (scene_.coupling->scheme == CouplingSettings::Scheme::aitken) return;
+  for (double dt : schedule_.lengths_us()) require_stability(stability_of(dt));
+}
+
+void FlowSimulation::require_stability(const StabilityEstimate& s) const {
+  if (s.margin() >= 1) return;
+  throw InputError(fmt::format(
+      "coupling: M / (A dt) + beta = {:.3g} + {:.3g} pg/um2/us is below {:.3g}, half the fluid's reaction (the larger of "
+      "2 mu / h = {:.3g}, to the shortest membrane wave the grid resolves, and 3/4 of the fluid carried along over the "
+      "step, {:.3g}), so this run would diverge. Use coupling.scheme = \"robin\" with its default coefficient, or a "
+      "cell of at least {:.3g} pg (cells.0.mass_pg), or coupling.scheme = \"aitken\"",
+      s.mass_term, s.beta, s.threshold(), s.viscous, s.inertial,
+      (s.threshold() - s.beta) / s.mass_term * scene_.cells[0].mass_pg));
 }
 
 /// An unstable staggered coupling swings to and fro: the velocity after a step has little to do with that before it, and
@@ -137,8 +146,9 @@ void FlowSimulation::watch_growth(double change, double speed_square) {
 }
 
 void FlowSimulation::step() {
-  const double dt = scene_.time.step_us;
+  const double dt = next_step_us();
   statistics_ = {};
+  if (membranes_) stability_ = stability_of(dt);
   fluid_->begin_step(dt);
   if (!immersed_) {
     fluid_->solve(time_ + dt, nullptr);
@@ -150,8 +160,9 @@ void FlowSimulation::step() {
     step_staggered(dt);
   }
   ++steps_;
-  // Multiples of the step, not a running sum: a restarted run must see the same times.
-  time_ = static_cast<double>(steps_) * scene_.time.step_us;
+  tick_ += schedule_.ticks(tick_);
+  time_ = schedule_.time_us(tick_);
+  last_step_ = dt;
 }
 
 void FlowSimulation::step_rigid(double dt) {
@@ -236,7 +247,16 @@ void FlowSimulation::step_iterated(double dt) {
 }
 
 void FlowSimulation::resume(const Progress& progress) {
-  time_ = progress.time;
+  tick_ = schedule_.tick_at(progress.time);
+  if (tick_ < 0)
+    throw InputError(fmt::format("no step of this case begins at {} us, where the checkpoint is: use another time.step_us or "
+                                 "time.first_step_us", progress.time));
+  constexpr double most = 2;  // beyond 1 + sqrt(2), errors of second-order backward differences grow (Hairer et al., III.5)
+  if (next_step_us() > most * progress.last_step * (1 + 1e-9))
+    throw InputError(fmt::format("the step can at most double at a restart: the checkpoint was written with steps of {} us, and "
+                                 "this case goes on with {} us; reduce time.step_us", progress.last_step, next_step_us()));
+  time_ = schedule_.time_us(tick_);
+  last_step_ = progress.last_step;
   steps_ = progress.steps;
   relaxation_ = progress.relaxation;
 }

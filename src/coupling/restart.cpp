@@ -87,7 +87,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
       file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d),
                box_values(index, faces, state.flux_old[d]).data());
   }
-  const double numbers[3] = {state.reference_speed, progress.relaxation, simulation.step_us()};
+  const double numbers[3] = {state.reference_speed, progress.relaxation, progress.last_step};
   file.add("numbers", {3}, numbers);
   const std::int64_t levels = state.history_levels;
   file.add("history_levels", {1}, &levels);
@@ -136,10 +136,11 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   }
   double numbers[3];
   file.read("numbers", {3}, numbers);
-  if (numbers[2] != simulation.step_us())
-    throw InputError(fmt::format("{}: written with time.step_us = {}, and this case has {}: second-order steps cannot "
-                                 "change their length; use the same step",
-                                 path, numbers[2], simulation.step_us()));
+  try {
+    simulation.resume({file.header().time_us, numbers[1], numbers[2], file.header().step});
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path, error.what()));
+  }
   std::int64_t levels = 0;
   file.read("history_levels", {1}, &levels);
   state.reference_speed = numbers[0];
@@ -157,7 +158,6 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
     simulation.immersed()->boundary().set_location_state(places);
   }
   fluid.restore(state);
-  simulation.resume({file.header().time_us, numbers[1], file.header().step});
 }
 
 }  // namespace corpuscle

@@ -136,20 +136,23 @@ void FluidSolver::begin_step(double dt) {
   std::swap(u_old_, u_);
   Kokkos::deep_copy(p_old_, p_);
   const bool second_order = history_levels_ >= 1;
-  mass_ = rho * (second_order ? 1.5 : 1.0) / dt;
-  mass1_ = rho * (second_order ? 2.0 : 1.0) / dt;
-  mass2_ = rho * (second_order ? -0.5 : 0.0) / dt;
+  // Backward differences on steps dt and dt / ratio (Hairer, Norsett and Wanner, Solving ODEs I, section III.5).
+  ratio_ = second_order ? dt / last_step_ : 0;
+  last_step_ = dt;
+  mass_ = rho * (1 + 2 * ratio_) / ((1 + ratio_) * dt);
+  mass1_ = rho * (1 + ratio_) / dt;
+  mass2_ = -rho * ratio_ * ratio_ / ((1 + ratio_) * dt);
   momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
   if (mass_ != momentum_->mass) momentum_->mass = mass_, momentum_->stale = true;
   // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
   if (second_order)
-    extrapolate(u_old_, u_older_, u_);
+    extrapolate(ratio_, u_old_, u_older_, u_);
   else
     Kokkos::deep_copy(u_, u_old_);
   if (settings_.convection != FluidSettings::Convection::none) {
     for (int d = 0; d < 3; ++d) {
       if (second_order)
-        extrapolate(flux_[d], flux_old_[d], flux_extrapolated_[d]);
+        extrapolate(ratio_, flux_[d], flux_old_[d], flux_extrapolated_[d]);
       else
         Kokkos::deep_copy(flux_extrapolated_[d], flux_[d]);
       std::swap(flux_[d], flux_old_[d]);
@@ -160,19 +163,6 @@ void FluidSolver::begin_step(double dt) {
   statistics_ = {0, 0, 0, 0, statistics_.reference_speed, 0};
 }
 
-void FluidSolver::abandon_step() {
-  std::swap(u_, u_old_);
-  std::swap(u_old_, u_older_);
-  Kokkos::deep_copy(p_, p_old_);
-  if (settings_.convection != FluidSettings::Convection::none)
-    for (int d = 0; d < 3; ++d) {
-      std::swap(flux_[d], flux_old_[d]);
-      // solve() wrote over the older fluxes: recover them from their extrapolation.
-      if (history_levels_ > 1) extrapolate(flux_[d], flux_extrapolated_[d], flux_old_[d]);
-    }
-  --history_levels_;
-}
-
 void FluidSolver::assemble_history(double time) {
   boundaries_.set_time(time);
   if (update_force_) update_force_(time);
@@ -180,7 +170,7 @@ void FluidSolver::assemble_history(double time) {
   if (body_force_.data()) add_body_force(grid_->views(), body_force_, history_);
   if (settings_.convection == FluidSettings::Convection::extrapolated && history_levels_ > 0) {
     if (history_levels_ > 1)
-      extrapolate(u_old_, u_older_, work_);
+      extrapolate(ratio_, u_old_, u_older_, work_);
     else
       Kokkos::deep_copy(work_, u_old_);
     subtract_convection(grid_->views(), kind_, settings_.density_pg_per_um3, flux_extrapolated_, work_, history_);
@@ -312,7 +302,7 @@ std::vector<int> FluidSolver::multigrid_cells() const {
 }
 
 FluidSolver::State FluidSolver::state() const {
-  State s{u_, u_old_, p_, {}, {}, history_levels_, statistics_.reference_speed};
+  State s{u_, u_old_, p_, {}, {}, history_levels_, statistics_.reference_speed, 0, last_step_};
   for (int d = 0; d < 3; ++d) s.flux[d] = flux_[d], s.flux_old[d] = flux_old_[d];
   return s;
 }
@@ -346,6 +336,7 @@ void FluidSolver::restore(const State& state) {
     if (flux_old_[d].data() && state.flux_old[d].data()) Kokkos::deep_copy(flux_old_[d], state.flux_old[d]);
   }
   history_levels_ = state.history_levels;
+  last_step_ = state.step_us;
   statistics_.reference_speed = state.reference_speed;
   grid_->halo().exchange(u_);
   grid_->halo().exchange(u_old_);

@@ -37,14 +37,12 @@ class FluidSolver {
   FluidSolver(Grid& grid, const FluidSettings& settings, const std::vector<BoundarySettings>& boundaries,
               const GridSettings* shape = nullptr, Timers* timers = nullptr);
 
-  /// Start a step: the present solution becomes history.
+  /// Start a step: the present solution becomes history. Steps may differ in length; second order, but for the first.
   void begin_step(double dt_us);
   /// Solve for the velocity and pressure at `time_us`; may be called again within the same step with other surface
   /// velocities: the answer depends on those alone, the previous one is a first guess.
   /// @throws ComputationError  when a linear solver does not converge or the velocity is not finite
   void solve(double time_us, const EmbeddedBodies* bodies);
-  /// Undo begin_step: the state before the step is the present one again (its next solve may differ in the last bits).
-  void abandon_step();
 
   /// Node kinds after bodies have moved; the halo layers must be up to date. Without bodies this is never called.
   void set_kinds(const Array<NodeKind>& kind);
@@ -96,7 +94,7 @@ class FluidSolver {
     Array<double> flux[3], flux_old[3];   // flux_old only with convection
     int history_levels = 0;               // how many earlier velocities are valid
     double reference_speed = 0;
-    double time_us = 0, step_us = 0;      // of u, and from u_old to u: boundary velocities are those of these times
+    double time_us = 0, step_us = 0;      // of u (not filled by state()), and from u_old to u
     /// The same with memory of its own.
     State copy() const;
   };
@@ -131,6 +129,7 @@ class FluidSolver {
   FluidSettings settings_;
   BoundaryConditions boundaries_;
   double mu_ = 0, mass_ = 0, mass1_ = 0, mass2_ = 0;
+  double last_step_ = 0, ratio_ = 0;  // us; the present step over the one before, 0 for a first step
   Vec3 imposed_gradient_;
   bool skewed_ = false;
   int history_levels_ = 0;

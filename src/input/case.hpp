@@ -15,6 +15,7 @@ using Triple = std::array<double, 3>;
 struct TimeSettings {
   double step_us = 1;
   double end_us = 0;
+  double first_step_us = 0;  // the first steps are this long at most; 0: step_us
 
   bool operator==(const TimeSettings&) const = default;
 };

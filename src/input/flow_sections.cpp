@@ -48,6 +48,7 @@ TimeSettings read_time(Section& s) {
   TimeSettings time;
   time.step_us = s.number("step_us", positive());
   time.end_us = s.number("end_us", positive());
+  time.first_step_us = s.number("first_step_us", not_negative(), 0.0);
   s.finish();
   if (time.step_us > time.end_us) s.fail("step_us", fmt::format("must not exceed end_us = {}", time.end_us));
   return time;

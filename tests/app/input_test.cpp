@@ -190,9 +190,13 @@ TEST_CASE("checkpoints that do not fit") {
     succeed(folder, with({"run", scene("tube_flow"), "--out", "plain"}, {"grid.nodes=[17,17,25]", "time.end_us=2"}));
     refuse_restart(again, "plain/checkpoint.h5", {"plain/checkpoint.h5", "membranes", "another scene"});
   }
-  SECTION("of another step: its step number is no time in this case") {
-    refuse_restart(coarse_tube("out", {"time.end_us=4", "time.step_us=0.5"}), "good/checkpoint.h5",
+  SECTION("of steps that this case's would be too long after") {
+    refuse_restart(coarse_tube("out", {"time.end_us=4", "time.step_us=4"}), "good/checkpoint.h5",
                    {"good/checkpoint.h5", "time.step_us"});
+  }
+  SECTION("at a time that is none of this case") {
+    refuse_restart(coarse_tube("out", {"time.end_us=4.2", "time.step_us=0.6"}), "good/checkpoint.h5",
+                   {"good/checkpoint.h5", "2 us", "time.step_us"});
   }
   SECTION("at the end already") {
     refuse_restart(coarse_tube("out", {"time.end_us=2"}), "good/checkpoint.h5", {"2 us", "time.end_us"});

@@ -128,8 +128,31 @@ TEST_CASE("a restart goes on with the same bits") {
     require_same_after_restart(folder, scene("straight_tube"),
                                {"cells.0.membrane_viscosity_N_s_per_m=0", "boundary.0.ramp_us=0"}, true);
   }
+  SECTION("cell, steps that grow") {
+    require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.0625"}, true);
+  }
   SECTION("cell, iterated coupling") {
     require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=aitken"}, true);
+  }
+}
+
+TEST_CASE("a restart may go on with steps of another length") {
+  const auto folder = fresh_folder("restart_step");
+  succeed(folder, coarse_tube("whole", {"time.end_us=24"}));
+  const auto whole = history(folder / "whole");
+  for (const char* step : {"0.5", "2"}) {
+    succeed(folder, coarse_tube("parts", {"time.end_us=12"}));
+    auto words = coarse_tube("parts", {"time.end_us=24", std::string("time.step_us=") + step});
+    words.insert(words.end(), {"--restart", "parts/checkpoint.h5"});
+    succeed(folder, words);
+    const auto parts = history(folder / "parts");
+    const auto last = parts.lines.size() - 1, whole_last = whole.lines.size() - 1;
+    INFO("step " << step);
+    REQUIRE(parts.number(last, "time_us") == 24);
+    // The cell lags behind the inlet's ramp, which ends at 20 us, by about a step.
+    for (const char* name : {"centroid_z_um", "velocity_z_mm_per_s"})
+      CHECK(parts.number(last, name) == Approx(whole.number(whole_last, name)).epsilon(0.08));
+    CHECK(report(folder / "parts")["errors"]["max_divergence"].get<double>() < 1e-10);
   }
 }
 

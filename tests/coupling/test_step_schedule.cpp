@@ -1,0 +1,83 @@
+// Steps that grow from a start at rest: when they begin, and what they buy.
+#include <catch2/catch.hpp>
+
+#include "core/error.hpp"
+#include "membrane/mesh.hpp"
+#include "scenes.hpp"
+
+namespace corpuscle {
+namespace {
+
+std::vector<double> times(const StepSchedule& schedule, long from = 0) {
+  std::vector<double> all;
+  for (long tick = from; tick <= schedule.end(); tick += schedule.ticks(tick)) all.push_back(schedule.time_us(tick));
+  return all;
+}
+
+TriangleMesh after(Case scene, double step_us, double first_step_us, long* steps = nullptr) {
+  scene.time = {step_us, scene.time.end_us, first_step_us};
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  const long expected = simulation.steps_left();
+  while (!simulation.done()) simulation.step();
+  REQUIRE(simulation.time() == scene.time.end_us);
+  REQUIRE(simulation.steps() == expected);
+  if (steps) *steps = simulation.steps();
+  return body_mesh(*simulation.surfaces(), 0);
+}
+
+double rms_distance(const TriangleMesh& a, const TriangleMesh& b) {
+  double sum = 0;
+  for (std::size_t v = 0; v < a.vertices.size(); ++v)
+    for (int m = 0; m < 3; ++m) sum += std::pow(a.vertices[v][m] - b.vertices[v][m], 2);
+  return std::sqrt(sum / a.vertices.size());
+}
+
+}  // namespace
+
+TEST_CASE("a schedule without first steps is uniform", "[coupling]") {
+  for (const double first : {0.0, 0.3, 5.0}) {
+    const StepSchedule schedule({0.3, 1.2, first});
+    CHECK(times(schedule) == std::vector<double>{0, 0.3, 2 * 0.3, 3 * 0.3, 4 * 0.3});
+    CHECK(schedule.steps_from(0) == 4);
+    CHECK(schedule.lengths_us() == std::vector<double>{0.3});
+  }
+}
+
+TEST_CASE("steps double from the first to the full length and meet every whole step", "[coupling]") {
+  const StepSchedule schedule({4, 400, 1.5});  // the longest half of a half that is at most 1.5
+  CHECK(schedule.lengths_us() == std::vector<double>{1, 2, 4});
+  const auto all = times(schedule);
+  CHECK(all.back() == 400);
+  CHECK(schedule.steps_from(0) == static_cast<long>(all.size()) - 1);
+  for (std::size_t n = 0; n + 1 < all.size(); ++n) {
+    const double step = all[n + 1] - all[n];
+    CHECK(step == (all[n] < 50 ? 1 : (all[n] < 100 ? 2 : 4)));
+    CHECK(schedule.steps_from(schedule.tick_at(all[n])) == static_cast<long>(all.size() - 1 - n));
+  }
+  CHECK(schedule.tick_at(0.5) == -1);
+  // From a time that no full step meets, as after a restart: no step is skipped, none overshoots.
+  const auto later = times(schedule, schedule.tick_at(201));
+  CHECK(std::vector<double>(later.begin(), later.begin() + 4) == std::vector<double>{201, 202, 204, 208});
+  CHECK(later.back() == 400);
+}
+
+TEST_CASE("an end that is no whole number of steps is refused", "[coupling]") {
+  CHECK_THROWS_WITH(StepSchedule({4, 42, 1}), Catch::Contains("time.end_us") && Catch::Contains("use 4"));
+}
+
+TEST_CASE("short first steps take out the error of the start", "[coupling]") {
+  const auto scene = scenes::tube_with_cell(17, 25, 100, CouplingSettings::Scheme::robin, 120);
+  const auto reference = after(scene, 1, 0.25);
+  long uniform_steps = 0, growing_steps = 0;
+  const double uniform = rms_distance(after(scene, 4, 0, &uniform_steps), reference);
+  const double half = rms_distance(after(scene, 2, 0), reference);
+  const double growing = rms_distance(after(scene, 4, 1, &growing_steps), reference);
+  INFO("rms distance: 4 us " << uniform << ", 2 us " << half << ", 1 to 4 us " << growing << " um; " << growing_steps << " steps");
+  CHECK(uniform_steps == 30);
+  CHECK(growing_steps == 80);
+  CHECK(growing < half);
+  CHECK(growing < 0.5 * uniform);
+}
+
+}  // namespace corpuscle
