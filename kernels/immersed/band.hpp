@@ -112,15 +112,19 @@ inline void mark_band(const Lattice& lattice, const SurfaceSet& surface, const I
         const double ra = dot(k.a - centre, k.a - centre), rb = dot(k.b - centre, k.b - centre),
                      rc = dot(k.c - centre, k.c - centre);
         const double radius = std::sqrt(ra > rb ? (ra > rc ? ra : rc) : (rb > rc ? rb : rc));
-        const double width = around.width, nearby = (radius + width) * (radius + width);
+        const double width = around.width;
         const Key farthest = pack_key(width, 0);
+        constexpr double rounding = 1 + 1e-6;  // of single precision in a key
         const NodeBox box = around.nodes(lattice, around.pad);
         for (int kk = box.lower[2]; kk <= box.upper[2]; ++kk) {
           for (int j = box.lower[1]; j <= box.upper[1]; ++j) {
             for (int i = box.lower[0]; i <= box.upper[0]; ++i) {
               const int c = lattice.node(i, j, kk);
               const Vec3 p = lattice.position(c), from_centre = p - centre;
-              if (std::fabs(dot(from_centre, unit)) > width || dot(from_centre, from_centre) > nearby) continue;
+              // Most triangles are told by two simple bounds that a closer one has been there, or that the node is too far.
+              const Key held = key(c);
+              const double most = held < farthest ? rounding * key_value(held) : width, nearby = radius + most;
+              if (std::fabs(dot(from_centre, unit)) > most || dot(from_centre, from_centre) > nearby * nearby) continue;
               const Key mine = offer(p, k, item);
               if (mine < farthest && mine < key(c)) Kokkos::atomic_fetch_min(&key(c), mine);
             }

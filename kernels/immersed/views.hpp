@@ -51,6 +51,12 @@ KOKKOS_INLINE_FUNCTION Key pack_key(double value, unsigned item) {
   memcpy(&bits, &rounded, sizeof bits);
   return (static_cast<Key>(bits) << 32) | item;
 }
+KOKKOS_INLINE_FUNCTION double key_value(Key key) {
+  const unsigned bits = static_cast<unsigned>(key >> 32);
+  float value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
 KOKKOS_INLINE_FUNCTION unsigned key_item(Key key) { return static_cast<unsigned>(key & 0xffffffffu); }
 
 /// Corners of triangle `t` moved by `shift`.
