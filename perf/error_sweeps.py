@@ -7,7 +7,8 @@ import numpy as np
 
 import study
 
-KEYS = {"nodes": "grid.nodes", "step_us": "time.step_us", "vertices": "cells.0.vertices", "spin_deg": "cells.0.spin_deg",
+KEYS = {"nodes": "grid.nodes", "step_us": "time.step_us", "first_step_us": "time.first_step_us",
+        "vertices": "cells.0.vertices", "spin_deg": "cells.0.spin_deg",
         "cross_section": "grid.cross_section", "convection": "fluid.convection",
         "momentum_tolerance": "fluid.momentum_tolerance", "divergence_tolerance": "fluid.divergence_tolerance",
         "scheme": "coupling.scheme", "coupling_tolerance": "coupling.tolerance",

@@ -18,7 +18,8 @@ MU, RHO, NU = 1.1, 1.0, 1.1         # mPa s, pg/um3, um2/us
 
 def tube(scale, **values):
     """cases/straight_tube.toml, smaller; overrides with dots written as __."""
-    overrides = {"grid.nodes": list(scale.nodes), "cells.0.vertices": scale.vertices, STEP: 1, "time.end_us": scale.end_us,
+    overrides = {"grid.nodes": list(scale.nodes), "cells.0.vertices": scale.vertices, STEP: 1, "time.first_step_us": 0,
+                 "time.end_us": scale.end_us,
                  "output.history_every_us": 0, "output.checkpoint_every_us": 0}
     overrides |= {key.replace("__", "."): value for key, value in values.items()}
     overrides["output.every_us"] = overrides["time.end_us"]
