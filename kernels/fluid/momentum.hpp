@@ -176,12 +176,15 @@ struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes> {
   }
 };
 
+// Here nodes with a momentum equation are told by `inverse`, of the diagonal in the velocity's cycle, which is zero at all
+// others: with node kinds, of one byte, compilers take so many cells at once that a short line has too few.
+
 /// out = A u at fluid nodes, zero elsewhere.
 template <class Operator>
-void apply_momentum(const Operator& a, const Components<float>& u, const Components<float>& out) {
-  for_owned("corpuscle::fluid::momentum_operator", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
+void apply_momentum(const Operator& a, const Array<float>& inverse, const Components<float>& u, const Components<float>& out) {
+  for_owned_rounded("corpuscle::fluid::momentum_operator", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = a.index.cell(i, j, k);
-    const float fluid = a.kind(c) == NodeKind::fluid ? 1 : 0;
+    const float fluid = inverse(c) > 0 ? 1 : 0;
     store(out, c, fluid * a.apply(u, c));
   });
 }
@@ -193,7 +196,7 @@ double momentum_residual(const Operator& a, double mu, const Components<double>&
                          const Components<double>& u, const Array<float>& inverse, const Components<float>& residual) {
   return sum_owned("corpuscle::fluid::momentum_residual", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = a.index.cell(i, j, k);
-    const double fluid = a.kind(c) == NodeKind::fluid ? 1 : 0, scale = 1 / mu;
+    const double fluid = inverse(c) > 0 ? 1 : 0, scale = 1 / mu;
     const Vec3 left = fluid * (scale * (load(history, c) - a.volume(c) * load(grad_p, c)) - a.apply(u, c));
     residual(c, 0) = left.x, residual(c, 1) = left.y, residual(c, 2) = left.z;
     return inverse(c) * inverse(c) * dot(left, left);

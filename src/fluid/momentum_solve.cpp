@@ -73,7 +73,7 @@ class FluidSolver::Correction {
       apply_homogeneous_rows(*bodies_, direction);
       f_.exchange_immersed(direction);
     }
-    f_.with_operator([&](const auto& a) { apply_momentum(a, direction, image); });
+    f_.with_operator([&](const auto& a) { apply_momentum(a, finest_.views.inverse, direction, image); });
   }
   double advance(double factor, const Components<float>& image) {
     return advance_velocity(index_, finest_.views.inverse, factor, finest_.x, image, f_.u_, m_.r);

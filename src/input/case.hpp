@@ -122,7 +122,7 @@ struct CouplingSettings {
   Scheme scheme = Scheme::robin;
   double tolerance = 1e-3;              // aitken: residual over the step's displacement
   int max_iterations = 200;             // aitken
-  double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see estimate_stability)
+  double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see FlowSimulation::stability_of)
   bool robin_in_aitken = true;
 
   bool operator==(const CouplingSettings&) const = default;

@@ -191,7 +191,7 @@ TEST_CASE("checkpoints that do not fit") {
     refuse_restart(again, "plain/checkpoint.h5", {"plain/checkpoint.h5", "membranes", "another scene"});
   }
   SECTION("of steps that this case's would be too long after") {
-    refuse_restart(coarse_tube("out", {"time.end_us=4", "time.step_us=4"}), "good/checkpoint.h5",
+    refuse_restart(coarse_tube("out", {"time.end_us=4", "time.step_us=4", "time.first_step_us=0"}), "good/checkpoint.h5",
                    {"good/checkpoint.h5", "time.step_us"});
   }
   SECTION("at a time that is none of this case") {
