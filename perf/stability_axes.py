@@ -144,13 +144,18 @@ def step_rows(s, threshold):
     def setup(dt, ramp_us):
         end = 100 if dt >= 0.5 else 20 if dt >= 0.2 else 5
         return tube(s, time__step_us=end / round(end / dt), time__end_us=end, boundary__0__ramp_us=ramp_us)
-    return [Series(
+    rows = [Series(
         axis="step", name=f"time step, 100 pg, {name}", unit="us", values=values, bisect=bisect, cause=UNSTABLE,
         setup=lambda dt, ramp=ramp: setup(dt, ramp), judge=outline(with_values({STEP: 0.5})),
         quantity="rms distance to dt = 0.5 us, um",
         source=GROWS + "; no longest step, since viscous terms are implicit")
         for name, ramp, values, bisect in (("ramp 20 us", 20, [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], s.bisect),
                                            ("impulsive", 0, [0.05, 0.1, 0.2, 1, 10, 50], 0))]
+    return rows + [Series(
+        axis="step", name="time step, 100 pg, first steps 1 us", unit="us", values=[4, 10, 20, 50], cause=UNSTABLE,
+        setup=lambda dt: tube(s, time__step_us=dt, time__first_step_us=1, time__end_us=200),
+        judge=outline(with_values({STEP: 0.5})), quantity="rms distance to dt = 0.5 us, um",
+        source="none: a step of a 25th of the time since the start at most (src/coupling/step_schedule.hpp)")]
 
 
 def membrane_rows(s):
