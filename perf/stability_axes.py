@@ -10,6 +10,8 @@ from stability_runs import (SPEED, STEP, Series, Setup, axial_diameter, cell_spe
                             poiseuille, with_values)
 
 AREA = 132.0                        # um2 of the triangulated cell
+THICKNESS = 2.55                    # um, of the resting cell's rim
+GROWING = {STEP: 4, "time.first_step_us": 1}
 ADDED_MASS = {"added mass, free fluid": 1.19, "added mass, 10 um tube": 2.4}   # um, c of the docstring
 MU, RHO, NU = 1.1, 1.0, 1.1         # mPa s, pg/um3, um2/us
 
@@ -58,8 +60,8 @@ def channel(folder, name, convection="true", skew_deg=0.0, aspect=1.0, jump=1.0,
     return Setup(CHANNEL.format(file=path, convection=convection), {})
 
 
-def narrowing(folder, scale, nodes, throat):
-    """The tube's own nodes, drawn in to a throat of `throat` um between z = 1 and 7 um."""
+def narrowing(folder, scale, nodes, throat, vertices):
+    """The tube's own nodes, drawn in to a throat of `throat` um between z = 1 and 7 um, and a cell carried into it."""
     nodes, s = nodes.copy(), np.clip((nodes[..., 2] - 1) / 6, 0, 1)
     nodes[..., :2] *= (1 + (throat / 10 - 1) * s ** 2 * (3 - 2 * s))[..., None]
     path = folder / f"throat_{throat:g}.h5"
@@ -67,8 +69,15 @@ def narrowing(folder, scale, nodes, throat):
         file["nodes"] = nodes
     text = (study.ROOT / "cases/straight_tube.toml").read_text()
     text = re.sub(r"\[grid\].*?(?=\[fluid\])", f'[grid]\ngenerator = "file"\nfile = "{path}"\n\n', text, flags=re.S)
-    values = tube(scale).overrides | {SPEED: 40, "time.end_us": 160, "output.every_us": 160}
-    return Setup(text, {key: value for key, value in values.items() if not key.startswith("grid.")})
+    values = tube(scale).overrides | {"cells.0.vertices": vertices, "time.end_us": 3000, "output.every_us": 3000} | GROWING
+    return Setup(text, {key: value for key, value in values.items() if not key.startswith("grid.")}, (10 / throat) ** 2)
+
+
+def two_cells(scale, distance):
+    """The tube with a second cell behind the first, centres `distance` um apart."""
+    text = (study.ROOT / "cases/straight_tube.toml").read_text()
+    text += f"\n[[cells]]\ncenter_um = [0, 0, {-distance}]\nvertices = {scale.vertices}\n"
+    return Setup(text, tube(scale).overrides)
 
 
 # Predicted limits.
@@ -269,7 +278,9 @@ def grid_rows(s, work):
 def placement_rows(s, work, nodes):
     half = outline(half_step, 2)
     gap = "starting gap of 1 spacing, then 0.75 (src/coupling/flow_simulation.hpp, starting_gap, smallest_gap)"
-    cause = r"gap|outside|wall|too narrow"
+    cause = r"gap|outside|wall|too narrow|cross|cut off"
+    folds = ("the film beside the cell holds; the folds of its rear rim must not pass through each other, nor close "
+             "fluid in (src/coupling/immersed_flow.cpp, check_positions): a finer mesh folds later")
     spacing = lambda d: 1.2 * d / (s.nodes[0] - 1)   # of the conformal map next to the wall, midway between its corners
     narrowest = next(d for d in np.arange(7, 14, 0.01) if d / 2 - 3.9 > spacing(d))
 
@@ -280,8 +291,10 @@ def placement_rows(s, work, nodes):
     return [
         row("tubes", "tube diameter", "um", [6, 7, 8, 10, 12], lambda d: tube(s, grid__diameter_um=d), [narrowest],
             s.bisect - 1),
-        row("tubes", "throat of a narrowing tube", "um", [6, 8], lambda d: narrowing(work, s, nodes, d),
-            source=gap + "; the cell is carried 6 um at 40 mm/s"),
+        row("tubes", "throat of a narrowing tube", "um", [5, 6, 7, 8], lambda d: narrowing(work, s, nodes, d, s.vertices),
+            bisect=s.bisect - 2, source=folds),
+        row("tubes", "throat of a narrowing tube, thrice the vertices", "um", [5, 6],
+            lambda d: narrowing(work, s, nodes, d, 3 * s.vertices), bisect=s.bisect - 3, source=folds),
         row("placement", "off axis, 10 um tube", "um", [0, 0.25, 0.5, 1, 1.5],
             lambda x: tube(s, cells__0__center_um=[x, 0, 0]), [5 - 3.9 - spacing(10)], s.bisect - 1),
         row("placement", "off axis, 12 um tube", "um", [0, 0.5, 1, 1.5],
@@ -289,6 +302,10 @@ def placement_rows(s, work, nodes):
         row("placement", "tilt", "deg", [0, 30, 60, 90], lambda a: tube(s, cells__0__axis=tilt(a)), source="none: it fits"),
         row("placement", "centre from touching to outside", "um", [1.1, 2, 5, 9],
             lambda x: tube(s, cells__0__center_um=[x, 0, 0]), source=gap + ": every point refused"),
+        row("placement", "two cells, centre to centre", "um", [0.1, 2, 3, 5, 8, 10], lambda z: two_cells(s, z),
+            [THICKNESS + 2 * 45 / (s.nodes[2] - 1)], s.bisect - 1,
+            source="a fluid node between the rims, so two spacings along the tube at least and three at most: else they cut "
+            "the fluid between the dimples off (src/fluid/fluid_solver.cpp, check_connected)"),
     ]
 
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "immersed/band.hpp"
+#include "immersed/clearance.hpp"
 
 namespace corpuscle {
 
@@ -249,33 +250,46 @@ inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const Sur
 }
 
 /// Slots of the array filled by count_nodes().
-enum NodeCount { count_band, count_immersed, count_inside, count_undecided, count_cut, count_uncovered, count_slots };
+enum NodeCount {
+  count_band,
+  count_immersed,
+  count_inside,
+  count_undecided,
+  count_cut,
+  count_uncovered,
+  count_crossed,  // links of crossed_links()
+  crossed_node,   // 1 + the highest owned node with such a link, 0: none
+  count_slots
+};
 
 /// Owned nodes of `box` (band nodes: halos too): totals into counts[0 .. count_slots), then per body immersed and
 /// inside. A node is uncovered when it was inside at the last classification and is fluid now.
-inline void count_nodes(const IndexSpace& index, const NodeBox& box, const BandViews& band, const NodeViews& nodes,
+inline void count_nodes(const Lattice& lattice, const NodeBox& box, const BandViews& band, const NodeViews& nodes,
                         const Array<NodeKind>& previous, const Array<int>& counts) {
+  const BandViews b = band;
   const auto kind = nodes.kind;
   const auto body = nodes.body;
-  const auto cut = band.cut;
-  const auto key = band.key;
   Kokkos::deep_copy(Exec(), counts, 0);
   Kokkos::parallel_for(
       "corpuscle::immersed::count_nodes", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
         int i[3];
         box.unpack(e, i);
-        const int c = index.cell(i[0], i[1], i[2]);
-        if (key(c) != no_key) Kokkos::atomic_fetch_add(&counts(count_band), 1);
-        if (!index.owns(i[0], i[1], i[2])) return;
+        const int c = lattice.node(i[0], i[1], i[2]);
+        if (b.key(c) != no_key) Kokkos::atomic_fetch_add(&counts(count_band), 1);
+        if (!lattice.index.owns(i[0], i[1], i[2])) return;
         if (kind(c) == undecided) Kokkos::atomic_fetch_add(&counts(count_undecided), 1);
         if (kind(c) == NodeKind::fluid && previous(c) == NodeKind::inside) {
           Kokkos::atomic_fetch_add(&counts(count_uncovered), 1);
         }
-        const int links = (cut(c) & 1) + ((cut(c) >> 1) & 1) + ((cut(c) >> 2) & 1);
+        const int cut = b.cut(c), links = (cut & 1) + ((cut >> 1) & 1) + ((cut >> 2) & 1);
         if (links > 0) Kokkos::atomic_fetch_add(&counts(count_cut), links);
         if (kind(c) == NodeKind::immersed) {
           Kokkos::atomic_fetch_add(&counts(count_immersed), 1);
           Kokkos::atomic_fetch_add(&counts(count_slots + 2 * body(c)), 1);
+          const int crossed = crossed_links(lattice, b, kind, c);
+          if (crossed == 0) return;
+          Kokkos::atomic_fetch_add(&counts(count_crossed), crossed);
+          Kokkos::atomic_fetch_max(&counts(crossed_node), c + 1);
         } else if (kind(c) == NodeKind::inside) {
           Kokkos::atomic_fetch_add(&counts(count_inside), 1);
           Kokkos::atomic_fetch_add(&counts(count_slots + 2 * body(c) + 1), 1);

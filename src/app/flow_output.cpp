@@ -276,6 +276,7 @@ void FlowOutput::fill(Report& report) {
                                 {"velocity_fallbacks", search.velocity_fallbacks},
                                 {"least_wall_spacings", search.least_wall_spacings},
                                 {"traction_fits", simulation_.immersed()->boundary().traction_fallbacks()}};
+    if (search.least_body_spacings < 1e30) report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
   }
   if (simulation_.membranes()) {
     errors["volume_drift"] = volume_drift_;

@@ -66,10 +66,23 @@ void print_end(const Report& report, const std::string& folder) {
   info("results in {}", folder);
 }
 
+/// Where steps change their length.
+void print_schedule(const StepSchedule& schedule) {
+  const auto lengths = schedule.lengths_us();
+  if (lengths.size() == 1) return;
+  std::string text = fmt::format("{:g} us", lengths[0]);
+  for (std::size_t n = 1; n < lengths.size(); ++n) {
+    const double from = StepSchedule::steps_per_length * lengths[n];
+    if (from < schedule.time_us(schedule.end())) text += fmt::format(", {:g} us from {:g} us on", lengths[n], from);
+  }
+  info("steps: {}; {} in all", text, schedule.steps_from(0));
+}
+
 Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const std::string& folder) {
   const auto start = Clock::now();
   Timers timers;
   FlowSimulation simulation(comm, scene, timers);
+  print_schedule(simulation.schedule());
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
     info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
@@ -267,6 +280,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
   const double nodes = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,
        simulation.surfaces() ? simulation.surfaces()->vertices : 0);
+  print_schedule(simulation.schedule());
   if (simulation.membranes()) {
     const auto& s = simulation.stability();
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",

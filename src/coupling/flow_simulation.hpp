@@ -39,6 +39,7 @@ class FlowSimulation {
   /// Length of the next step, and of the last one (0 before the first).
   double next_step_us() const { return schedule_.step_us(tick_); }
   double last_step_us() const { return last_step_; }
+  const StepSchedule& schedule() const { return schedule_; }
   long steps() const { return steps_; }
   long steps_left() const { return schedule_.steps_from(tick_); }
   bool done() const { return tick_ >= schedule_.end(); }

@@ -38,10 +38,14 @@ int ImmersedFlow::first_unowned_vertex() {
 void ImmersedFlow::check_positions(double smallest_gap) {
   const auto& counts = boundary_->counts();
   const Comm& comm = fluid_.grid().comm();
-  const double nearest = comm.min(counts.wall_spacings);
-  report_.least_wall_spacings = std::min(report_.least_wall_spacings, nearest);
+  double worst[4] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
+                     static_cast<double>(counts.crossed_links), -counts.body_spacings};
+  comm.max(worst, 4);
+  const double to_wall = -worst[1], between = -worst[3];
+  report_.least_wall_spacings = std::min(report_.least_wall_spacings, to_wall);
+  report_.least_body_spacings = std::min(report_.least_body_spacings, between);
   const long found = comm.sum(static_cast<long>(counts.owned_vertices));
-  int vertex = static_cast<int>(comm.max(static_cast<double>(counts.lost_vertex)));
+  int vertex = static_cast<int>(worst[0]);
   if (vertex >= 0 || found < surfaces_.vertices) {
     if (vertex < 0) vertex = first_unowned_vertex();
     throw ComputationError(fmt::format(
@@ -49,15 +53,55 @@ void ImmersedFlow::check_positions(double smallest_gap) {
         "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
         boundary_->describe_vertex(vertex)));
   }
-  if (nearest < smallest_gap) {
-    const bool here = counts.wall_spacings == nearest;
+  if (to_wall < smallest_gap) {
+    const bool here = counts.wall_spacings == to_wall;
     vertex = static_cast<int>(comm.max(here ? static_cast<double>(counts.wall_vertex) : -1.0));
     throw ComputationError(fmt::format(
         "gap to the wall: {} is {:.2f} grid spacings from a wall, and {:.2f} are needed to resolve the film between "
         "them. Contact forces do not exist yet: move or tilt the cell (center_um, axis), refine the grid (grid.nodes) "
         "or use a wider channel",
-        boundary_->describe_vertex(vertex), nearest, smallest_gap));
+        boundary_->describe_vertex(vertex), to_wall, smallest_gap));
   }
+  if (worst[2] > 0) {
+    const bool here = counts.crossed_links == worst[2];
+    const auto [where, first, second] = describe_bodies(here ? counts.crossed_node : -1);
+    if (second.empty())
+      throw ComputationError(fmt::format(
+          "surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "
+          "or a step too long (time.step_us): contact forces do not exist yet",
+          first, where));
+    throw ComputationError(fmt::format(
+        "surfaces cross: {} and {} overlap near {}. Contact forces do not exist yet: move them apart (center_um, axis) or "
+        "end the run before they meet (time.end_us)",
+        first, second, where));
+  }
+  if (between < smallest_gap) {
+    const bool here = counts.body_spacings == between;
+    const auto [where, first, second] = describe_bodies(here ? counts.gap_node : -1);
+    throw ComputationError(fmt::format(
+        "gap between bodies: {} and {} are {:.2f} grid spacings apart, or overlap, near {}, and {:.2f} are needed to resolve the film "
+        "between them. Contact forces do not exist yet: move them apart (center_um, axis), refine the grid (grid.nodes) or "
+        "end the run before they meet (time.end_us)",
+        first, second.empty() ? "its image beyond a periodic boundary" : second, between, where, smallest_gap));
+  }
+}
+
+/// Where a node is, and the names of the bodies beside it, the second empty if there is none. On all ranks; from the
+/// highest rank whose node is not -1. Copies to the host: for error messages.
+std::array<std::string, 3> ImmersedFlow::describe_bodies(int node) {
+  const Comm& comm = fluid_.grid().comm();
+  const double speaker = comm.max(node >= 0 ? static_cast<double>(comm.rank()) : -1.0);
+  double said[5] = {-1e300, -1e300, -1e300, -1e300, -1e300};
+  if (comm.rank() == static_cast<int>(speaker)) {
+    const NearBodies near = boundary_->bodies_near(node);
+    for (int d = 0; d < 3; ++d) said[d] = near.at[d];
+    said[3] = near.other < 0 ? near.body : std::min(near.body, near.other);
+    said[4] = near.other < 0 ? -1 : std::max(near.body, near.other);
+  }
+  comm.max(said, 5);
+  const int first = static_cast<int>(said[3]), second = static_cast<int>(said[4]);
+  return {fmt::format("({:.4g}, {:.4g}, {:.4g}) um", said[0], said[1], said[2]), body_name(surfaces_, first),
+          second < 0 ? "" : body_name(surfaces_, second)};
 }
 
 void ImmersedFlow::check_resolution() {
@@ -94,6 +138,7 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   const auto matrix = timers_.scope("pressure matrix");
   fluid_.grid().halo().exchange(boundary_->nodes().kind);
   fluid_.set_kinds(boundary_->nodes().kind);
+  if (report_.classifications == 1) fluid_.check_connected();
 }
 
 void ImmersedFlow::solve(double time) {

@@ -5,7 +5,9 @@
 #include "fluid/fluid_solver.hpp"
 #include "immersed/immersed_boundary.hpp"
 
+#include <array>
 #include <memory>
+#include <string>
 
 namespace corpuscle {
 
@@ -17,6 +19,7 @@ struct ImmersedReport {
   long velocity_fallbacks = 0;      // rows worse than one probe, over the run
   long traction_fallbacks = 0;      // fits worse than the first choice, at the last output
   double least_wall_spacings = 1e30;
+  double least_body_spacings = 1e30;  // between two bodies
 };
 
 class ImmersedFlow {
@@ -24,8 +27,9 @@ class ImmersedFlow {
   ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers);
 
   /// Classify nodes and build all stencils at the surfaces' present positions.
-  /// @param smallest_gap  refuse vertices nearer to a wall than this many local spacings
-  /// @throws ComputationError  vertex outside the grid or too near to a wall, body too small for the grid
+  /// @param smallest_gap  refuse surfaces nearer to a wall or to each other than this many local spacings
+  /// @throws ComputationError  vertex outside the grid or too near to a wall, surfaces that cross or are too near to each
+  ///                           other, body too small for the grid
   void update_geometry(double smallest_gap);
   /// Solve the flow with the surfaces' present velocities.
   void solve(double time_us);
@@ -53,6 +57,7 @@ class ImmersedFlow {
  private:
   int first_unowned_vertex();
   void check_positions(double smallest_gap);
+  std::array<std::string, 3> describe_bodies(int node);
   void check_resolution();
 
   FluidSolver& fluid_;

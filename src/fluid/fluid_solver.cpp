@@ -221,14 +221,18 @@ long FluidSolver::cut_off_nodes() {
   return grid_->comm().sum(static_cast<long>(unmarked_cells(index, kind_, mark)));
 }
 
-void FluidSolver::fail_projection(double largest, double target) {
+void FluidSolver::check_connected() {
   const long cut_off = cut_off_nodes();
-  if (cut_off > 0)
-    throw ComputationError(fmt::format(
-        "pressure: the bodies close the channel on this grid: {} fluid nodes have no way to {}. Likely cause: a channel too narrow for "
-        "what is in it, or too few nodes across the gap: refine the grid (grid.nodes), widen the channel, or end the run "
-        "before (time.end_us)",
-        cut_off, boundaries_.has_outflow() ? "an outflow" : "the rest"));
+  if (cut_off == 0) return;
+  throw ComputationError(fmt::format(
+      "pressure: on this grid the bodies cut off {} fluid nodes from {}. Likely cause: a gap of less than two or three grid "
+      "spacings all around, between a body and a wall, between two bodies or in a body's fold: refine the grid (grid.nodes), "
+      "widen the channel, move the bodies apart (center_um), or end the run before (time.end_us)",
+      cut_off, boundaries_.has_outflow() ? "the outflow" : "the rest"));
+}
+
+void FluidSolver::fail_projection(double largest, double target) {
+  check_connected();
   throw ComputationError(fmt::format(
       "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
       "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "

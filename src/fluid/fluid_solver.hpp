@@ -46,6 +46,9 @@ class FluidSolver {
 
   /// Node kinds after bodies have moved; the halo layers must be up to date. Without bodies this is never called.
   void set_kinds(const Array<NodeKind>& kind);
+  /// For set-up and failures: floods the grid, with temporary arrays.
+  /// @throws ComputationError  when bodies cut fluid nodes off from where the pressure is given
+  void check_connected();
 
   Grid& grid() { return *grid_; }
   BoundaryConditions& boundaries() { return boundaries_; }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "core/error.hpp"
 
@@ -106,6 +105,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   tractions_ = {make<Components<double>>("traction", surface.vertices, 3),
                 make<Components<double>>("traction_pressure", surface.vertices, 3),
                 make<Components<double>>("traction_viscous", surface.vertices, 3)};
+  if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
   allocate_rows(0);
   allocate_faces(0);
 
@@ -147,10 +147,7 @@ NodeBox ImmersedBoundary::read_places() {
   counts_.wall_spacings = 1e30;
   counts_.wall_vertex = -1;
   if (found(1) != no_key) {
-    const auto bits = static_cast<std::uint32_t>(found(1) >> 32);
-    float spacings = 0;
-    std::memcpy(&spacings, &bits, sizeof spacings);
-    counts_.wall_spacings = spacings;
+    counts_.wall_spacings = key_value(found(1));
     counts_.wall_vertex = static_cast<int>(key_item(found(1)));
   }
   NodeBox all;
@@ -195,15 +192,23 @@ void ImmersedBoundary::classify_nodes(const NodeBox& box) {
   mark_immersed(lattice_, box, surface_, band_, nodes_);
   counts_.isolated = absorb_isolated(lattice_, box, surface_, images_, normals_, band_, nodes_);
   counts_.isolated += absorb_pockets(grid_.index, box, surface_, band_, nodes_, reached_);
-  count_nodes(grid_.index, box, band_, nodes_, previous_kind_, node_counts_);
+  count_nodes(lattice_, box, band_, nodes_, previous_kind_, node_counts_);
   read_counts(box);
+  if (least_gap_.extent(0) > 0) measure_gaps(box);
+}
+
+void ImmersedBoundary::measure_gaps(const NodeBox& box) {
+  find_least_gap(lattice_, box, surface_, images_, band_, least_gap_);
+  const Key found = to_host(least_gap_)(0);
+  counts_.body_spacings = found == no_key ? 1e30 : key_value(found);
+  counts_.gap_node = found == no_key ? -1 : static_cast<int>(key_item(found));
 }
 
 void ImmersedBoundary::read_counts(const NodeBox& box) {
   auto counts = to_host(node_counts_);
   if (counts(count_band) == 0) {
     const NodeBox all = resolve_enclosed(box);
-    count_nodes(grid_.index, all, band_, nodes_, previous_kind_, node_counts_);
+    count_nodes(lattice_, all, band_, nodes_, previous_kind_, node_counts_);
     Kokkos::deep_copy(counts, node_counts_);
   }
   counts_.immersed = counts(count_immersed);
@@ -211,6 +216,8 @@ void ImmersedBoundary::read_counts(const NodeBox& box) {
   counts_.fluid = grid_.index.owned() - counts_.immersed - counts_.inside;
   counts_.cut_links = counts(count_cut);
   counts_.uncovered = counts(count_uncovered);
+  counts_.crossed_links = counts(count_crossed);
+  counts_.crossed_node = counts(crossed_node) - 1;
   counts_.body_immersed.resize(surface_.bodies);
   counts_.body_inside.resize(surface_.bodies);
   for (int b = 0; b < surface_.bodies; ++b) {
@@ -318,6 +325,21 @@ std::string ImmersedBoundary::describe_vertex(int vertex) const {
   const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
   return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y,
                      x.z);
+}
+
+NearBodies ImmersedBoundary::bodies_near(int node) const {
+  const auto x = to_host(lattice_.x);
+  const auto key = to_host(band_.key);
+  const auto triangle_body = to_host(surface_.triangle_body);
+  const auto body = [&](int c) {
+    return triangle_body(static_cast<int>(key_item(key(c)) % static_cast<unsigned>(surface_.triangles)));
+  };
+  NearBodies near{load(x, node), body(node), -1};
+  for (int side = 0; side < 6 && near.other < 0; ++side) {
+    const int other = node + (side % 2 == 0 ? 1 : -1) * grid_.index.stride(side / 2);
+    if (key(other) != no_key && body(other) != near.body) near.other = body(other);
+  }
+  return near;
 }
 
 }  // namespace corpuscle

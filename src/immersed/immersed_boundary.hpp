@@ -35,6 +35,16 @@ struct ImmersedCounts {
   int lost_vertex = -1;         // lowest vertex beyond a physical boundary seen here; -1: none
   double wall_spacings = 1e30;  // least distance to a wall, in local spacings
   int wall_vertex = -1;         // the vertex that has it
+  int crossed_links = 0;        // where surfaces cross, each other or themselves
+  int crossed_node = -1;        // a node there
+  double body_spacings = 1e30;  // least gap between two bodies, in spacings; what exceeds one may have escaped
+  int gap_node = -1;            // a node there
+};
+
+/// A node and the bodies that its and its neighbours' closest surface points belong to.
+struct NearBodies {
+  Vec3 at;                // um
+  int body, other = -1;   // -1: no other
 };
 
 /// Owns the search band, the classification and the stencils of one rank's block. Nothing here communicates.
@@ -88,6 +98,8 @@ class ImmersedBoundary {
   void set_location_state(const std::vector<double>& state);
   /// "bodies.2, vertex 17 at (x, y, z) um"; copies from the device.
   std::string describe_vertex(int vertex) const;
+  /// The bodies beside a node of the band; copies from the device.
+  NearBodies bodies_near(int node) const;
 
  private:
   StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
@@ -95,6 +107,7 @@ class ImmersedBoundary {
   void classify_nodes(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
   void read_counts(const NodeBox& box);
+  void measure_gaps(const NodeBox& box);
   void allocate_rows(int rows);
   void allocate_faces(int faces);
 
@@ -112,6 +125,7 @@ class ImmersedBoundary {
   Array<NodeKind> previous_kind_;
   Array<std::int8_t> reached_;
   Array<int> node_counts_, row_counts_, traction_counts_;
+  Array<Key> least_gap_;  // empty where there is only one body
   StencilViews velocity_, pressure_;
   FootViews feet_;
   Components<double> u_surface_;

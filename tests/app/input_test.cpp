@@ -106,6 +106,30 @@ TEST_CASE("cells where they cannot be") {
   }
 }
 
+TEST_CASE("cells that overlap, or stand closer than the grid can resolve") {
+  const auto folder = fresh_folder("two_cells");
+  const auto two_cells = [&](const std::string& z) {
+    const std::string text = contents(scene("straight_tube")), file = "two_" + z + ".toml";
+    std::ofstream(folder / file) << text << "\n[[cells]]\ncenter_um = [0, 0, " << z << "]\nvertices = 500\n";
+    return with({"run", (folder / file).string(), "--out", "out"},
+                {"grid.nodes=[17,17,25]", "time.step_us=1", "time.end_us=2", "output.every_us=2"});
+  };
+#ifdef CORPUSCLE_MPI
+  const std::vector<int> launches{1, 2};
+#else
+  const std::vector<int> launches{1};
+#endif
+  for (const int ranks : launches) {
+    // Disks 2.55 um thick, grid spacing 1.9 um.
+    fail(folder, two_cells("0.1"), 2, {"cells.0 and cells.1", "overlap", "center_um"}, {1, ranks});
+    fail(folder, two_cells("2.0"), 2, {"surfaces cross", "cells.0 and cells.1 overlap", "center_um"}, {1, ranks});
+    fail(folder, two_cells("3.5"), 2, {"gap between bodies", "cells.0 and cells.1", "grid spacings apart", "grid.nodes"},
+         {1, ranks});
+    fail(folder, two_cells("5.5"), 2, {"cut off", "fluid nodes", "between two bodies", "grid.nodes"}, {1, ranks});
+  }
+  succeed(folder, two_cells("10"));
+}
+
 TEST_CASE("surfaces that are open or inside out") {
   const auto folder = fresh_folder("surfaces");
   const auto whole = mesh_file(folder, "same.off", [](Words&) {});

@@ -108,6 +108,21 @@ TEST_CASE("a coupling below the added mass of the fluid is refused, or stopped w
   }
 }
 
+TEST_CASE("cells too close to each other are refused, and stopped when they come too close", "[coupling][stability]") {
+  const auto followed_at = [](double distance_um, int steps) {
+    Case scene = tube(100, 1, steps);
+    scene.boundaries[4].ramp_us = 20;
+    scene.cells.push_back(scene.cells[0]);
+    scene.cells[1].center_um = {0, 0, -distance_um};
+    return scene;
+  };
+  CHECK_THROWS_AS(run(followed_at(3, 1)), InputError);
+  // 1.3 spacings between the rims at the start; as the disks bend, the film between their middles narrows to 0.75.
+  CHECK_THROWS_AS(run(followed_at(5, 60)), ComputationError);
+  CHECK_THROWS_WITH(run(followed_at(5, 60)), Catch::Contains("gap between bodies: cells.0 and cells.1"));
+  require_sound(followed_at(10, 10));
+}
+
 TEST_CASE("surface meshes much coarser and much finer than the grid", "[coupling][stability]") {
   for (const int vertices : {200, 3000}) {
     INFO(vertices << " vertices");

@@ -60,6 +60,15 @@ void check_scene(const GridViews& grid, const SurfaceSet& surface) {
   CHECK(found.band > ib.counts().immersed);
   CHECK(ib.counts().owned_vertices == surface.vertices);
   CHECK(ib.counts().lost_vertex == -1);
+  CHECK(ib.counts().crossed_links == 0);
+}
+
+int crossed_links(const GridViews& grid, const SurfaceSet& surface) {
+  ImmersedBoundary ib(grid, surface, plain());
+  ib.classify();
+  const auto& counts = ib.counts();
+  CHECK((counts.crossed_node >= 0) == (counts.crossed_links > 0));
+  return counts.crossed_links;
 }
 
 }  // namespace
@@ -126,6 +135,71 @@ TEST_CASE("nodes on the surface and surfaces aligned with the grid are no except
         }
       }
     }
+  }
+  CHECK(ib.counts().crossed_links == 0);
+}
+
+TEST_CASE("surfaces that cross are noticed, and where") {
+  const GridViews grid = make_grid({{30, 24, 24}}, wavy({-4.35, -3.35, -3.35}, {0.3, 0.28, 0.28}));
+  const auto spheres = [](double radius, double distance) {
+    return make_surface_set({sphere(3, 1.5, {-1.01, 0.02, 0.03}), sphere(3, radius, {-1.01 + distance, 0.02, 0.03})});
+  };
+  CHECK(crossed_links(grid, spheres(1.2, 2.75)) == 0);
+  CHECK(crossed_links(grid, spheres(1.2, 2.4)) > 0);
+  CHECK(crossed_links(grid, spheres(1.2, 1.0)) > 0);
+  CHECK(crossed_links(grid, spheres(0.6, 0.1)) > 0);  // one wholly inside the other
+
+  ImmersedBoundary ib(grid, spheres(1.2, 2.4), plain());
+  ib.classify();
+  const NearBodies near = ib.bodies_near(ib.counts().crossed_node);
+  CHECK(std::min(near.body, near.other) == 0);
+  CHECK(std::max(near.body, near.other) == 1);
+  CHECK(near.at.x == Approx(0.45).margin(0.6));
+
+  // A dent pushed in until it comes out at the other end.
+  const auto dented = [](double depth) {
+    TriangleMesh mesh = sphere(4, 1.5, {0.01, 0.02, 0.03});
+    for (auto& v : mesh.vertices) {
+      if (v[0] > 0.75) v[0] -= depth * (v[0] - 0.75);
+    }
+    return make_surface_set({mesh});
+  };
+  CHECK(crossed_links(grid, dented(3.0)) == 0);
+  CHECK(crossed_links(grid, dented(5.0)) > 0);
+}
+
+TEST_CASE("the least gap between two bodies is counted in spacings") {
+  const int direction = GENERATE(0, 2);
+  const double spacings = GENERATE(0.1, 0.5, 0.95);
+  const Vec3 h{0.3, 0.25, 0.45}, centre{0.03, 0.02, 0.04};
+  const double radius = 1.1, gap = spacings * h[direction];
+  Block block{{30, 30, 20}};
+  Vec3 other = centre;
+  other[direction] += 2 * radius + gap;
+  SECTION("of two bodies") {
+    const GridViews grid = make_grid(block, uniform({-2.5, -2.5, -2.5}, h));
+    ImmersedBoundary ib(grid, make_surface_set({sphere(4, radius, centre), sphere(4, radius, other)}), plain());
+    ib.classify();
+    CHECK(ib.counts().body_spacings >= spacings - 1e-6);
+    CHECK(ib.counts().body_spacings == Approx(spacings).margin(0.1));
+    CHECK(ib.bodies_near(ib.counts().gap_node).at[direction] == Approx(centre[direction] + radius).margin(1.5 * h[direction]));
+  }
+  SECTION("of a body and its image") {
+    block.periodic[direction] = true;
+    Vec3 spacing = h;
+    spacing[direction] = (2 * radius + gap) / block.global[direction];
+    const GridViews grid = make_grid(block, uniform({-2.5, -2.5, -2.5}, spacing));
+    ImmersedOptions options;
+    options.period[direction][direction] = 2 * radius + gap;
+    ImmersedBoundary ib(grid, make_surface_set({sphere(4, radius, centre)}), options);
+    ib.classify();
+    CHECK(ib.counts().body_spacings == Approx(gap / spacing[direction]).margin(0.3));
+  }
+  SECTION("where there is none") {
+    const GridViews grid = make_grid(block, uniform({-2.5, -2.5, -2.5}, h));
+    ImmersedBoundary ib(grid, make_surface_set({sphere(4, radius, centre)}), plain());
+    ib.classify();
+    CHECK(ib.counts().body_spacings == 1e30);
   }
 }
 
