@@ -27,6 +27,28 @@ using Table = Kokkos::View<T**, Kokkos::LayoutRight, Memory>;
 template <class View>
 using HostMirror = decltype(Kokkos::create_mirror_view(std::declval<const View&>()));
 
+/// A device view and its copy on the host, allocated once: for what the host reads every step. Where the host can reach
+/// the view they are the same.
+template <class View>
+class HostCopy {
+ public:
+  HostCopy() = default;
+  explicit HostCopy(const View& view) : view_(view), host_(Kokkos::create_mirror_view(view)) {}
+
+  /// The view's present values.
+  const HostMirror<View>& read() const {
+    Kokkos::deep_copy(host_, view_);
+    return host_;
+  }
+  /// Puts back what was changed in the copy.
+  void write() const { Kokkos::deep_copy(view_, host_); }
+  bool is_of(const View& view) const { return view.data() == view_.data() && view.size() == view_.size(); }
+
+ private:
+  View view_;
+  HostMirror<View> host_;
+};
+
 using Policy = Kokkos::RangePolicy<Exec>;
 
 /// Uninitialised labelled allocation; every view in the program carries a label "corpuscle::module::name".

@@ -187,15 +187,17 @@ void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
     statistics_.flux_correction = std::max(statistics_.flux_correction, boundaries_.balance(flux_, 0) / speed);
     return;
   }
-  if (static_cast<int>(body_sums_.extent(0)) != bodies->bodies)
+  if (static_cast<int>(body_sums_.extent(0)) != bodies->bodies) {
     body_sums_ = Table<double>("corpuscle::immersed::body_sums", bodies->bodies, 2);
+    body_sums_host_ = HostCopy(body_sums_);
+  }
+  if (!growth_host_.is_of(bodies->growth)) growth_host_ = HostCopy(bodies->growth);
   body_flux_sums(grid_->views(), *bodies, flux_, body_sums_);
-  auto host = Kokkos::create_mirror_view(body_sums_);
-  Kokkos::deep_copy(host, body_sums_);
+  const auto& host = body_sums_host_.read();
   grid_->comm().sum(host.data(), 2 * bodies->bodies);
-  Kokkos::deep_copy(body_sums_, host);
+  body_sums_host_.write();
   correct_body_flux(grid_->views(), *bodies, body_sums_, flux_);
-  auto growth = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), bodies->growth);
+  const auto& growth = growth_host_.read();
   double total_growth = 0;
   for (int b = 0; b < bodies->bodies; ++b) {
     total_growth += growth(b);

@@ -147,6 +147,8 @@ class FluidSolver {
   double residual_norm_ = 0;
   Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)
   Table<double> body_sums_;
+  HostCopy<Table<double>> body_sums_host_;
+  HostCopy<Array<double>> growth_host_;
   std::unique_ptr<MultigridHierarchy> hierarchy_;
   /// What the momentum equation's corrections need, [cell, 3] in single precision: implicit convection, cross terms and
   /// immersed rows make the operator unsymmetric, so BiCGStab, preconditioned by a multigrid cycle.

@@ -106,6 +106,11 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
                 make<Components<double>>("traction_pressure", surface.vertices, 3),
                 make<Components<double>>("traction_viscous", surface.vertices, 3)};
   if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
+  box_host_ = HostCopy(places_.box);
+  found_host_ = HostCopy(places_.found);
+  node_counts_host_ = HostCopy(node_counts_);
+  row_counts_host_ = HostCopy(row_counts_);
+  least_gap_host_ = HostCopy(least_gap_);
   allocate_rows(0);
   allocate_faces(0);
 
@@ -140,8 +145,8 @@ void ImmersedBoundary::allocate_faces(int faces) {
 }
 
 NodeBox ImmersedBoundary::read_places() {
-  const auto box = to_host(places_.box);
-  const auto found = to_host(places_.found);
+  const auto& box = box_host_.read();
+  const auto& found = found_host_.read();
   counts_.lost_vertex = found(0) == no_key ? -1 : static_cast<int>(found(0));
   counts_.owned_vertices = static_cast<int>(found(2));
   counts_.wall_spacings = 1e30;
@@ -199,17 +204,17 @@ void ImmersedBoundary::classify_nodes(const NodeBox& box) {
 
 void ImmersedBoundary::measure_gaps(const NodeBox& box) {
   find_least_gap(lattice_, box, surface_, images_, band_, least_gap_);
-  const Key found = to_host(least_gap_)(0);
+  const Key found = least_gap_host_.read()(0);
   counts_.body_spacings = found == no_key ? 1e30 : key_value(found);
   counts_.gap_node = found == no_key ? -1 : static_cast<int>(key_item(found));
 }
 
 void ImmersedBoundary::read_counts(const NodeBox& box) {
-  auto counts = to_host(node_counts_);
+  const auto& counts = node_counts_host_.read();
   if (counts(count_band) == 0) {
     const NodeBox all = resolve_enclosed(box);
     count_nodes(lattice_, all, band_, nodes_, previous_kind_, node_counts_);
-    Kokkos::deep_copy(counts, node_counts_);
+    node_counts_host_.read();
   }
   counts_.immersed = counts(count_immersed);
   counts_.inside = counts(count_inside);
@@ -251,7 +256,7 @@ void ImmersedBoundary::build_stencils() {
   Kokkos::deep_copy(Exec(), row_counts_, 0);
   build_velocity_rows(input(), options_.reconstruction, counts_.immersed, velocity_, feet_, row_counts_);
   build_pressure_rows(input(), options_.pressure_extension, counts_.immersed, pressure_, row_counts_);
-  const auto counts = to_host(row_counts_);
+  const auto& counts = row_counts_host_.read();
   for (int k = 0; k < row_kinds; ++k) {
     counts_.velocity_rows[k] = counts(k);
     counts_.pressure_rows[k] = counts(row_kinds + k);

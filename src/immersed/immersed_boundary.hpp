@@ -126,6 +126,8 @@ class ImmersedBoundary {
   Array<std::int8_t> reached_;
   Array<int> node_counts_, row_counts_, traction_counts_;
   Array<Key> least_gap_;  // empty where there is only one body
+  HostCopy<Array<int>> box_host_, node_counts_host_, row_counts_host_;
+  HostCopy<Array<Key>> found_host_, least_gap_host_;
   StencilViews velocity_, pressure_;
   FootViews feet_;
   Components<double> u_surface_;

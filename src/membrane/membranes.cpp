@@ -53,6 +53,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   views_.surface.cells = views_.cells;
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
+  status_host_ = HostCopy(views_.status);
   start_x_ = Components<double>(label("start_x_vertex"), views_.vertices, 3);
   start_v_ = Components<double>(label("start_v_vertex"), views_.vertices, 3);
   if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(views_, tangential);
@@ -166,8 +167,7 @@ int Membranes::advance(double dt_us, const Components<double>& traction, double 
 }
 
 int Membranes::trouble() {
-  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.status);
-  return host(0) - 1;
+  return status_host_.read()(0) - 1;
 }
 
 void Membranes::explain(int cell, double dt) {

@@ -110,6 +110,7 @@ class Membranes {
 
   MembraneViews views_;
   MotionViews motion_;
+  HostCopy<Array<int>> status_host_;
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
   std::vector<double> vertex_mass_;              // [cell] pg
   std::vector<double> vertex_area_;              // [cell] smallest at rest, um2
