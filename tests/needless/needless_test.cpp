@@ -2,6 +2,7 @@
 // and everything that is launched or allocated has a label.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <unistd.h>
@@ -79,11 +80,16 @@ void check_modules(const Case& scene, const Counts& counts) {
 
 std::string case_file(const std::string& name) { return CORPUSCLE_SOURCE_DIR "/cases/" + name + ".toml"; }
 
-/// Set up and run a few steps with all output, then three more that must not allocate.
-void check_flow(const std::string& name, std::vector<std::string> overrides) {
+/// Set up and run a few steps with all output, then three more that must not allocate. @param second_cell_um  how far
+/// ahead of the first a second cell is; 0: none
+void check_flow(const std::string& name, std::vector<std::string> overrides, double second_cell_um = 0) {
   overrides.insert(overrides.end(), {"time.step_us=1", "time.end_us=20", "output.every_us=2", "output.history_every_us=0",
                                      "output.checkpoint_every_us=0"});
-  const Case scene = read_case(case_file(name), overrides);
+  Case scene = read_case(case_file(name), overrides);
+  if (second_cell_um > 0) {
+    scene.cells.push_back(scene.cells[0]);
+    scene.cells[1].center_um[2] += second_cell_um;
+  }
   const auto folder = std::filesystem::temp_directory_path() / ("corpuscle_needless_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   Recorder recorder;
@@ -107,6 +113,11 @@ void check_flow(const std::string& name, std::vector<std::string> overrides) {
   INFO(name);
   check_labels(all);
   check_modules(scene, all);
+  const bool periodic = std::any_of(scene.boundaries.begin(), scene.boundaries.end(), [](const BoundarySettings& side) {
+    return side.type == BoundarySettings::Type::periodic;
+  });
+  const std::size_t bodies = scene.cells.size() + scene.bodies.size();
+  CHECK((all.of("corpuscle::immersed::least_gap") > 0) == (bodies > 1 || (bodies == 1 && periodic)));
   CHECK(Recorder::matching(steps.kernels, "corpuscle::") > 0);
   for (const auto& [label, count] : steps.allocations) {
     INFO("view \"" << label << "\" was allocated " << count << " times in three steps");
@@ -182,6 +193,7 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   SECTION("Couette flow") { check_flow("couette", {}); }
   SECTION("uniform flow") { check_flow("uniform_flow", {"grid.nodes=[17,17,25]"}); }
   SECTION("straight tube") { check_flow("straight_tube", {tube}); }
+  SECTION("straight tube with two cells") { check_flow("straight_tube", {tube}, 10); }
   SECTION("straight tube, least of everything") {
     check_flow("straight_tube", {tube, "fluid.convection=false", "cells.0.membrane_viscosity_N_s_per_m=0",
                                  "output.fields=false", "output.cells=false"});
