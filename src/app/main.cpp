@@ -108,6 +108,7 @@ Command parse(CLI::App& app, int argc, char** argv) {
   return command;
 }
 
+#ifdef CORPUSCLE_MPI
 /// Whether a process that starts alone gets by without message passing, whose start-up takes longer than many a
 /// stretching test. A launcher has set one of these variables for each of its processes.
 bool can_stay_alone(const Command& command) {
@@ -121,6 +122,7 @@ bool can_stay_alone(const Command& command) {
     return true;  // all there is to do is to say so
   }
 }
+#endif
 
 int execute(const Comm& comm, const Command& command) {
   return run_command(comm, [&] {

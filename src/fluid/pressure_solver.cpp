@@ -17,6 +17,9 @@
     (defined(KOKKOS_ENABLE_HIP) && !defined(HYPRE_USING_HIP))
 #error "Kokkos runs on the GPU but hypre was built for the host: build hypre for the same GPU back end"
 #endif
+#if !defined(CORPUSCLE_MPI) && !defined(HYPRE_SEQUENTIAL)
+#error "this build has no MPI but hypre has: ./setup.sh --no-mpi builds one without"
+#endif
 
 namespace corpuscle {
 

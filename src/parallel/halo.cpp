@@ -102,7 +102,7 @@ Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& 
 template <class Field>
 void Halo::run(const Field& field) {
   using Value = typename Field::non_const_value_type;
-  const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
+  [[maybe_unused]] const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
   for (int d = 0; d < 3; ++d) {
     const int low = neighbour_[d][0], high = neighbour_[d][1];
     if (low == comm_.rank() && high == comm_.rank()) {  // periodic within this rank
