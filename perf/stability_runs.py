@@ -148,11 +148,11 @@ def outline(reference, factor=1.0):
 
 
 def half_step(setup):
-    return dataclasses.replace(setup, overrides=setup.overrides | {STEP: setup.overrides[STEP] / 2})
+    return with_values({STEP: setup.overrides[STEP] / 2})(setup)
 
 
 def with_values(values):
-    return lambda setup: Setup(setup.case, setup.overrides | values)
+    return lambda setup: dataclasses.replace(setup, overrides=setup.overrides | values)
 
 
 def cell_speed(reference):

@@ -16,7 +16,6 @@ inline void classify_band(const GridViews& grid, const NodeBox& box, const Surfa
   const IndexSpace index = grid.index;
   const auto base = grid.base_kind;
   const auto triangle_body = s.triangle_body;
-  const unsigned triangles = static_cast<unsigned>(s.triangles);
   const BandViews b = band;
   const NodeViews out = nodes;
   Kokkos::parallel_for(
@@ -31,7 +30,7 @@ inline void classify_band(const GridViews& grid, const NodeBox& box, const Surfa
           out.kind(c) = undecided;
         } else if (b.distance(c) < 0) {
           out.kind(c) = NodeKind::inside;
-          out.body(c) = triangle_body(key_item(b.key(c)) % triangles);
+          out.body(c) = key_body(triangle_body, b.key(c));
         }
       });
 }
@@ -103,7 +102,6 @@ inline double winding_number(const SurfaceSet& surface, const Images& images, in
 inline void mark_immersed(const Lattice& lattice, const NodeBox& box, const SurfaceSet& s, const BandViews& band,
                           const NodeViews& nodes) {
   const auto triangle_body = s.triangle_body;
-  const unsigned triangles = static_cast<unsigned>(s.triangles);
   const BandViews b = band;
   const NodeViews out = nodes;
   Kokkos::parallel_for(
@@ -122,7 +120,7 @@ inline void mark_immersed(const Lattice& lattice, const NodeBox& box, const Surf
         }
         if (!crossed || b.key(c) == no_key) return;
         out.kind(c) = NodeKind::immersed;
-        out.body(c) = triangle_body(key_item(b.key(c)) % triangles);
+        out.body(c) = key_body(triangle_body, b.key(c));
       });
 }
 
@@ -162,7 +160,7 @@ inline int absorb_isolated(const Lattice& lattice, const NodeBox& box, const Sur
         b.distance(c) = signed_foot(s, normals, images, p, key_item(best), foot);
         store(b.foot, c, foot);
         out.kind(c) = NodeKind::immersed;
-        out.body(c) = s.triangle_body(static_cast<int>(key_item(best) % static_cast<unsigned>(s.triangles)));
+        out.body(c) = key_body(s.triangle_body, best);
         if (lattice.index.owns(i[0], i[1], i[2])) sum += 1;
       },
       isolated);
@@ -230,7 +228,6 @@ inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const Sur
     for (int d = 0; d < 3; ++d) added += reach_along(index, box, d, nodes, reached);
   }
   const auto triangle_body = surface.triangle_body;
-  const unsigned triangles = static_cast<unsigned>(surface.triangles);
   const auto key = band.key;
   const NodeViews out = nodes;
   int absorbed = 0;
@@ -242,7 +239,7 @@ inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const Sur
         const int c = index.cell(i[0], i[1], i[2]);
         if (out.kind(c) != NodeKind::fluid || reached(c) || key(c) == no_key) return;
         out.kind(c) = NodeKind::immersed;
-        out.body(c) = triangle_body(static_cast<int>(key_item(key(c)) % triangles));
+        out.body(c) = key_body(triangle_body, key(c));
         if (index.owns(i[0], i[1], i[2])) sum += 1;
       },
       absorbed);

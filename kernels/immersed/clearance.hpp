@@ -53,10 +53,8 @@ inline void find_least_gap(const Lattice& lattice, const NodeBox& box, const Sur
           const int other = c + lattice.index.stride(d);
           if (b.key(other) == no_key) continue;
           const int its = static_cast<int>(key_item(b.key(other)));
-          if (mine / s.triangles == its / s.triangles &&
-              s.triangle_body(mine % s.triangles) == s.triangle_body(its % s.triangles)) {
-            continue;
-          }
+          const bool same_image = mine / s.triangles == its / s.triangles;
+          if (same_image && key_body(s.triangle_body, b.key(c)) == key_body(s.triangle_body, b.key(other))) continue;
           const double there = spacings_to_item(lattice, i, s, images, load(b.foot, c), its);
           const double back = spacings_to_item(lattice, i, s, images, load(b.foot, other), mine);
           Kokkos::atomic_fetch_min(&found(0), pack_key(there < back ? there : back, static_cast<unsigned>(c)));

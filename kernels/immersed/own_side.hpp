@@ -23,7 +23,7 @@ KOKKOS_INLINE_FUNCTION bool own_side(const Lattice& lattice, const SurfaceSet& s
   if (key == no_key) return true;
   if (band.distance(q) < 0) return false;
   const Vec3 foot = load(band.foot, q), out = x - foot, to_p = p.at - foot;
-  const int body = s.triangle_body(static_cast<int>(key_item(key) % static_cast<unsigned>(s.triangles)));
+  const int body = key_body(s.triangle_body, key);
   const double least = body == p.body ? -0.5 : -0.1;
   return dot(out, to_p) >= least * norm(out) * norm(to_p);
 }

@@ -59,6 +59,12 @@ KOKKOS_INLINE_FUNCTION double key_value(Key key) {
 }
 KOKKOS_INLINE_FUNCTION unsigned key_item(Key key) { return static_cast<unsigned>(key & 0xffffffffu); }
 
+/// Body of the closest triangle that a key names.
+template <class TriangleBody>
+KOKKOS_INLINE_FUNCTION int key_body(const TriangleBody& triangle_body, Key key) {
+  return triangle_body(key_item(key) % static_cast<unsigned>(triangle_body.extent(0)));
+}
+
 /// Corners of triangle `t` moved by `shift`.
 struct Corners {
   Vec3 a, b, c;

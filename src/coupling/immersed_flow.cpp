@@ -62,8 +62,15 @@ void ImmersedFlow::check_positions(double smallest_gap) {
         "or use a wider channel",
         boundary_->describe_vertex(vertex), to_wall, smallest_gap));
   }
-  if (worst[2] > 0) {
-    const bool here = counts.crossed_links == worst[2];
+  check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
+}
+
+/// @param crossed  the most crossed links of any rank
+/// @param between  the least gap between bodies of any rank, in spacings
+void ImmersedFlow::check_clearance(int crossed, double between, double smallest_gap) {
+  const auto& counts = boundary_->counts();
+  if (crossed > 0) {
+    const bool here = counts.crossed_links == crossed;
     const auto [where, first, second] = describe_bodies(here ? counts.crossed_node : -1);
     if (second.empty())
       throw ComputationError(fmt::format(
@@ -120,7 +127,8 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   update_surface_geometry(surfaces_);
   boundary_->classify();
   check_positions(smallest_gap);
-  if (report_.classifications == 0) check_resolution();
+  const bool first = report_.classifications == 0;
+  if (first) check_resolution();
   boundary_->build_stencils();
   const auto& counts = boundary_->counts();
   report_.classifications += 1;
@@ -138,7 +146,7 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   const auto matrix = timers_.scope("pressure matrix");
   fluid_.grid().halo().exchange(boundary_->nodes().kind);
   fluid_.set_kinds(boundary_->nodes().kind);
-  if (report_.classifications == 1) fluid_.check_connected();
+  if (first) fluid_.check_connected();
 }
 
 void ImmersedFlow::solve(double time) {

@@ -57,6 +57,7 @@ class ImmersedFlow {
  private:
   int first_unowned_vertex();
   void check_positions(double smallest_gap);
+  void check_clearance(int crossed, double between, double smallest_gap);
   std::array<std::string, 3> describe_bodies(int node);
   void check_resolution();
 

@@ -336,9 +336,7 @@ NearBodies ImmersedBoundary::bodies_near(int node) const {
   const auto x = to_host(lattice_.x);
   const auto key = to_host(band_.key);
   const auto triangle_body = to_host(surface_.triangle_body);
-  const auto body = [&](int c) {
-    return triangle_body(static_cast<int>(key_item(key(c)) % static_cast<unsigned>(surface_.triangles)));
-  };
+  const auto body = [&](int c) { return key_body(triangle_body, key(c)); };
   NearBodies near{load(x, node), body(node), -1};
   for (int side = 0; side < 6 && near.other < 0; ++side) {
     const int other = node + (side % 2 == 0 ? 1 : -1) * grid_.index.stride(side / 2);
