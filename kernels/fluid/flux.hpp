@@ -74,6 +74,15 @@ inline void negative_divergence(const GridViews& grid, const Array<NodeKind>& ki
   });
 }
 
+/// Sum of a compact vector.
+inline double sum_of(const Array<double>& vector) {
+  double total = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::fluid::sum_of", Policy(0, static_cast<int>(vector.extent(0))),
+      KOKKOS_LAMBDA(int e, double& sum) { sum += vector(e); }, total);
+  return total;
+}
+
 /// flux -= compact gradient of psi on faces whose both nodes have a pressure.
 template <bool skewed>
 void correct_flux(const GridViews& grid, const Array<double> (&coefficient)[3], const PressureMask& mask,

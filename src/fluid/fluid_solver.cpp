@@ -4,6 +4,7 @@
 #include "fluid/embedded_rows.hpp"
 #include "fluid/flux.hpp"
 #include "fluid/integrals.hpp"
+#include "fluid/projection_failure.hpp"
 
 #include <fmt/format.h>
 
@@ -233,15 +234,33 @@ void FluidSolver::check_connected() {
       cut_off, boundaries_.has_outflow() ? "the outflow" : "the rest"));
 }
 
-void FluidSolver::fail_projection(double largest, double target) {
+/// @param before  the divergence that the last solve started from; its potential has not been applied yet if `attempted`
+void FluidSolver::fail_projection(double before, double target, bool attempted) {
   check_connected();
-  throw ComputationError(fmt::format(
-      "pressure: the projection did not reach a divergence of {:.3g} um3/us (it is {:.3g}) in {} iterations. "
-      "Likely cause: a diverging run (a step too long, or a coupling too weak: see time.step_us and "
-      "coupling.robin_coefficient_pg_per_um2_per_us), {}or prescribed velocities that do not conserve volume; also "
-      "fluid.max_iterations and fluid.divergence_tolerance",
-      target, largest, statistics_.pressure_iterations,
-      skewed_ ? "a gap between body and wall too narrow for this skewed grid (grid.nodes), " : ""));
+  ProjectionFailure failure;
+  failure.target = target, failure.before = before;
+  failure.iterations = statistics_.pressure_iterations;
+  failure.skewed = skewed_;
+  if (attempted) {
+    apply_potential();
+    negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
+  }
+  failure.divergence = grid_->comm().max(largest_magnitude(negative_divergence_));
+  if (!boundaries_.has_outflow()) failure.net_inflow = grid_->comm().sum(sum_of(negative_divergence_));
+  for (const auto& flux : flux_) failure.face_flux = std::max(failure.face_flux, grid_->comm().max(largest_magnitude(flux)));
+  failure.speed = grid_->comm().max(largest_speed(grid_->index(), kind_, u_));
+  failure.earlier_speed =
+      std::max(boundaries_.largest_speed(), grid_->comm().max(largest_speed(grid_->index(), kind_, u_old_)));
+  throw ComputationError(explain(failure));
+}
+
+/// The fluxes less the gradient of the last solve's potential.
+void FluidSolver::apply_potential() {
+  grid_->halo().exchange(psi_field_);
+  if (skewed_)
+    correct_flux<true>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
+  else
+    correct_flux<false>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
 }
 
 void FluidSolver::project(const EmbeddedBodies* bodies) {
@@ -262,12 +281,8 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
     if (largest <= (round > 0 ? 1.5 * target : 0.0)) break;
     const auto result = round < rounds ? solve_pressure(round > 0 ? target : share * target) : KrylovResult{};
     statistics_.pressure_iterations += result.iterations;
-    if (!result.converged) fail_projection(largest, target);
-    grid_->halo().exchange(psi_field_);
-    if (skewed_)
-      correct_flux<true>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
-    else
-      correct_flux<false>(grid_->views(), g_.normal, mask_, psi_field_, flux_);
+    if (!result.converged) fail_projection(largest, target, round < rounds);
+    apply_potential();
     correct_velocity(grid_->views(), kind_, mask_, psi_field_, u_);
     update_pressure(grid_->views(), kind_, mass_, mu_, psi_field_, negative_divergence_, p_);
   }

@@ -113,7 +113,8 @@ class FluidSolver {
   void solve_momentum(const EmbeddedBodies* bodies, double residual);
   void project(const EmbeddedBodies* bodies);
   long cut_off_nodes();
-  [[noreturn]] void fail_projection(double largest, double target);
+  [[noreturn]] void fail_projection(double before, double target, bool attempted);
+  void apply_potential();
   KrylovResult solve_pressure(double target);
   void make_flux(const EmbeddedBodies* bodies);
   class Correction;
