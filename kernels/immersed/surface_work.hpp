@@ -1,19 +1,18 @@
 // Work that a flow does on immersed surfaces.
 #pragma once
 
-#include "common/sums.hpp"
-#include "immersed/surface_geometry.hpp"
+#include "immersed/surface_stress.hpp"
 
 namespace corpuscle {
 
-/// Power of the tractions on vertices first <= i < last, nW. @param traction  [vertex, 3] kPa
-inline double traction_power(const SurfaceSet& set, const Components<double>& traction, int first, int last) {
-  const auto v = set.v;
-  const auto area = set.area;
+/// Power of the fluid's forces on vertices first <= i < last, all those of some bodies, nW.
+inline double fluid_power(const SurfaceSet& surface, const SurfaceStress& stress, int first, int last) {
+  const SurfaceSet s = surface;
+  const SurfaceStress t = stress;
   double power = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::surface::traction_power", Policy(first, last),
-      KOKKOS_LAMBDA(int i, double& sum) { sum += area(i) * dot(load(traction, i), load(v, i)); }, power);
+      "corpuscle::surface::fluid_power", Policy(first, last),
+      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(fluid_force(s, t, i), load(s.v, i)); }, power);
   return power;
 }
 

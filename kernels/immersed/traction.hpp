@@ -3,6 +3,7 @@
 
 #include "immersed/own_side.hpp"
 #include "immersed/reconstruct.hpp"
+#include "immersed/surface_stress.hpp"
 
 namespace corpuscle {
 
@@ -28,7 +29,7 @@ enum TractionFallback {
   pressure_fitted,
   pressure_wide,     // linear fit from all points of the box, extended pressures included
   pressure_average,  // mean of the points
-  pressure_nothing,  // no fluid on this side: no pressure
+  pressure_nothing,  // no fluid on this side: no_pressure
   traction_counts
 };
 
@@ -180,38 +181,50 @@ KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Compo
   return how;
 }
 
-/// Linear fit of the pressure at the vertex from points up to `farthest`; `mean` gets their weighted average.
-KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
-                                         double farthest, double softening, bool immersed, double& value,
-                                         double& mean) {
-  NormalMatrix<4> normal;
-  double right[4] = {0, 0, 0, 0};
+/// A fit of the pressure. Differences from the first point are fitted: the level of the pressure is not rounded.
+struct PressureFit {
+  double value = 0, mean = 0;  // kPa: the fit's at the vertex; weighted average of the points
   int points = 0;
+};
+
+/// Linear fit of the pressure at the vertex from points up to `farthest`. @returns whether the points carry it
+KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
+                                         double farthest, double softening, bool immersed, PressureFit& fit) {
+  NormalMatrix<4> normal;
+  double right[4] = {0, 0, 0, 0}, level = 0;
+  fit.points = 0;
   for_nodes_around(in, t, farthest, softening, [&](int c, const Vec3& y, const Vec3&, double w) {
     const NodeKind kind = in.nodes.kind(c);
     if (kind != NodeKind::fluid && !(immersed && kind == NodeKind::immersed)) return;
+    if (fit.points == 0) level = p(c);
     const double phi[4] = {1, y.x, y.y, y.z};
     normal.add(phi, w);
-    for (int k = 0; k < 4; ++k) right[k] += w * phi[k] * p(c);
-    ++points;
+    for (int k = 0; k < 4; ++k) right[k] += w * phi[k] * (p(c) - level);
+    ++fit.points;
   });
-  mean = points > 0 ? right[0] / normal.a[0] : 0;
-  if (points < 6 || !normal.factorise(5e-3)) return false;
+  if (fit.points > 0) fit.mean = level + right[0] / normal.a[0];
+  if (fit.points < 6 || !normal.factorise(5e-3)) return false;
   normal.solve(right);
-  value = right[0];
+  fit.value = level + right[0];
   return true;
 }
 
 KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
                                             const TractionOptions& options, double& value) {
-  double mean = 0;
+  PressureFit fit;
   const double softening = options.softening;
-  if (fit_pressure(in, p, t, options.radius, softening, options.immersed_pressure, value, mean)) return pressure_fitted;
-  // Where the surface runs along a grid plane, a single layer of fluid nodes may be in reach: the layer between it and
-  // the surface, to which the pressure was extended, carries the slope.
-  if (fit_pressure(in, p, t, 1e3, softening, true, value, mean)) return pressure_wide;
-  value = mean;
-  return mean != 0 ? pressure_average : pressure_nothing;
+  int how = pressure_fitted;
+  if (!fit_pressure(in, p, t, options.radius, softening, options.immersed_pressure, fit)) {
+    // Where the surface runs along a grid plane, a single layer of fluid nodes may be in reach: the layer between it and
+    // the surface, to which the pressure was extended, carries the slope.
+    how = pressure_wide;
+    if (!fit_pressure(in, p, t, 1e3, softening, true, fit)) {
+      value = fit.points > 0 ? fit.mean : no_pressure;
+      return fit.points > 0 ? pressure_average : pressure_nothing;
+    }
+  }
+  value = fit.value;
+  return how;
 }
 
 /// Fields and parameters of a traction.
@@ -223,21 +236,17 @@ struct TractionInput {
   Vec3 origin;             // where the imposed gradient's pressure is zero, um
 };
 
-/// Where tractions go; all [vertex, 3], kPa, zero at vertices of other ranks.
-struct TractionOutput {
-  Components<double> total, pressure, viscous;
-};
-
 template <int N>
 void vertex_tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
-                      const TractionOptions& options, const TractionOutput& out, const Array<int>& counts) {
+                      const TractionOptions& options, const SurfaceStress& out, const Array<int>& counts) {
   const StencilInput in = input;
   const PlaceViews where = places;
   const TractionInput f = fields;
-  const TractionOutput to = out;
+  const SurfaceStress to = out;
   Kokkos::parallel_for(
       "corpuscle::immersed::vertex_tractions", Policy(0, in.surface.vertices), KOKKOS_LAMBDA(int v) {
-        Vec3 push, drag;
+        Vec3 drag;
+        double p = 0;
         if (where.image(v) >= 0) {
           const TractionVertex t = describe_vertex(in.lattice, in.surface, in.images, where, v);
           const Vec3 n = t.side.normal;
@@ -248,20 +257,16 @@ void vertex_tractions(const StencilInput& input, const PlaceViews& places, const
             const Vec3 transposed = n.x * gradient[0] + n.y * gradient[1] + n.z * gradient[2];
             drag = f.viscosity * (Vec3{dot(gradient[0], n), dot(gradient[1], n), dot(gradient[2], n)} + transposed);
           }
-          double p = 0;
           Kokkos::atomic_fetch_add(&counts(surface_pressure(in, f.p, t, options, p)), 1);
-          p += dot(f.pressure_gradient, load(in.surface.x, v) - f.origin);
-          push = -p * n;
+          if (has_pressure(p)) p += dot(f.pressure_gradient, load(in.surface.x, v) - f.origin);
         }
-        store(to.pressure, v, push);
-        store(to.viscous, v, drag);
-        store(to.total, v, push + drag);
+        to.set(v, p, drag);
       });
 }
 
-/// Traction of the fluid on the owned vertices, t = -p n + mu (grad u + grad u^T) n; counts as TractionFallback.
+/// Stress of the fluid at the owned vertices, zero at those of other ranks; counts as TractionFallback.
 inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
-                      const TractionOptions& options, const TractionOutput& out, const Array<int>& counts) {
+                      const TractionOptions& options, const SurfaceStress& out, const Array<int>& counts) {
   Kokkos::deep_copy(Exec(), counts, 0);
   switch (options.fit) {
     case TractionFit::gradient:
@@ -273,31 +278,6 @@ inline void tractions(const StencilInput& input, const PlaceViews& places, const
     case TractionFit::full_quadratic:
       return vertex_tractions<9>(input, places, fields, options, out, counts);
   }
-}
-
-/// Force (0 to 2) and torque about `centre` (3 to 5) of each body: [body, 6], nN and nN um. The vertices of a body are
-/// added up in a fixed order.
-inline void body_loads(const SurfaceSet& surface, const Components<double>& traction, const Components<double>& centre,
-                       const Components<double>& loads) {
-  using Team = Kokkos::TeamPolicy<Exec>;
-  const SurfaceSet s = surface;
-  const auto t = traction, about = centre, out = loads;
-  Kokkos::parallel_for(
-      "corpuscle::immersed::body_loads", Team(s.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team::member_type& team) {
-        const int b = team.league_rank(), first = s.first_vertex(b), count = s.first_vertex(b + 1) - first;
-        for (int component = 0; component < 6; ++component) {
-          double total = 0;
-          Kokkos::parallel_reduce(
-              Kokkos::TeamThreadRange(team, count),
-              [&](int e, double& sum) {
-                const int v = first + e;
-                const Vec3 force = s.area(v) * load(t, v);
-                sum += component < 3 ? force[component] : cross(load(s.x, v) - load(about, b), force)[component - 3];
-              },
-              total);
-          Kokkos::single(Kokkos::PerTeam(team), [&]() { out(b, component) = total; });
-        }
-      });
 }
 
 struct Slip {

@@ -1,30 +1,36 @@
 // One sub-step of symplectic Euler (Equation 18) with the volume held by projection.
 #pragma once
 
+#include "immersed/surface_stress.hpp"
 #include "membrane/forces.hpp"
 
 namespace corpuscle {
 
-/// What acts on a membrane from outside. A choice made once, at compile time of the kernels.
+/// What acts on a membrane from outside. A choice made once, at compile time of the kernels. force() is that on vertex i,
+/// nN, which stands for `area`; triangle geometry must be current.
 struct NoLoad {
   static constexpr double beta = 0;
-  KOKKOS_INLINE_FUNCTION Vec3 force(int, double) const { return {}; }
+  KOKKOS_INLINE_FUNCTION Vec3 force(const MembraneViews&, int, double) const { return {}; }
 };
 
-/// Traction of the fluid, kPa.
-struct TractionLoad {
+/// The fluid's stress.
+struct FluidLoad {
   static constexpr double beta = 0;
-  Components<double> traction;  // [vertex, 3]
-  KOKKOS_INLINE_FUNCTION Vec3 force(int i, double area) const { return area * load(traction, i); }
+  SurfaceStress stress;
+  KOKKOS_INLINE_FUNCTION Vec3 force(const MembraneViews& m, int i, double area) const {
+    const auto& geometry = m.triangle_geometry;
+    return area * stress.viscous(i) +
+           pressure_force(m.surface, stress, i, [&](int t) { return geometry(t, 3) * load(geometry, t); });
+  }
 };
 
-/// Traction with the fluid's reaction anticipated: t - beta (v - v_star).
+/// The same with the fluid's reaction anticipated: - beta (v - v_star) on the vertex's area.
 struct RobinLoad {
-  Components<double> traction;  // [vertex, 3] kPa
-  Components<double> v_star;    // [vertex, 3] um/us
-  double beta;                  // pg/um2/us
-  KOKKOS_INLINE_FUNCTION Vec3 force(int i, double area) const {
-    return area * (load(traction, i) + beta * load(v_star, i));
+  FluidLoad fluid;
+  Components<double> v_star;  // [vertex, 3] um/us
+  double beta;                // pg/um2/us
+  KOKKOS_INLINE_FUNCTION Vec3 force(const MembraneViews& m, int i, double area) const {
+    return fluid.force(m, i, area) + (area * beta) * load(v_star, i);
   }
 };
 
@@ -34,7 +40,7 @@ struct MotionViews {
   Table<double> sums;            // [cell * sections, 2] v . dV/dx um3/us, and direction . dV/dx
 };
 
-/// (M/dt + beta A) v = M v/dt + F + A t + beta A v_star at each vertex, and what the projection needs.
+/// (M/dt + beta A) v = M v/dt + F + F_fluid + beta A v_star at each vertex, and what the projection needs.
 /// The corner forces and triangle geometry must be current.
 template <class Load>
 void predict_velocity(const MembraneViews& m, const MotionViews& w, const Load& outside, double dt) {
@@ -49,7 +55,7 @@ void predict_velocity(const MembraneViews& m, const MotionViews& w, const Load& 
               double area;
               const Vec3 gradient = gather_area(m, i, area);
               const double inverse = 1 / (inertia + outside.beta * area);
-              const Vec3 velocity = inverse * (inertia * load(v, i) + gather_force(m, i) + outside.force(i, area));
+              const Vec3 velocity = inverse * (inertia * load(v, i) + gather_force(m, i) + outside.force(m, i, area));
               store(v, i, velocity);
               store(w.direction, i, inverse * gradient);
               sum[0] += dot(velocity, gradient);

@@ -80,7 +80,7 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
         store(w.gradient, i, gather_area(m, i, area));
         const double diagonal = inertia + outside.beta * area;
         w.diagonal(i) = diagonal;
-        store(w.right_side, i, inertia * load(v, i) + gather_force(m, i) + outside.force(i, area));
+        store(w.right_side, i, inertia * load(v, i) + gather_force(m, i) + outside.force(m, i, area));
         Symmetric3 b;
         const int first = m.surface.ring_start(i), last = m.surface.ring_start(i + 1);
         for (int r = first; r < last; ++r) {

@@ -38,10 +38,10 @@ void EnergyBalance::sample(double elastic_fJ) {
   now.kinetic = flow.kinetic_fJ;
   driving_pressure_ = flow.inflow_um3_per_us > 0 ? flow.boundaries_nW / flow.inflow_um3_per_us : 0;
   if (surfaces) {
-    const auto& traction = simulation_.immersed()->last_tractions();
+    const auto& stress = simulation_.immersed()->last_stress();
     const int of_cells = simulation_.membranes() ? simulation_.membranes()->vertices() : 0;
-    if (of_cells > 0) now.on_cells = traction_power(*surfaces, traction, 0, of_cells);
-    if (of_cells < surfaces->vertices) now.on_bodies = traction_power(*surfaces, traction, of_cells, surfaces->vertices);
+    if (of_cells > 0) now.on_cells = fluid_power(*surfaces, stress, 0, of_cells);
+    if (of_cells < surfaces->vertices) now.on_bodies = fluid_power(*surfaces, stress, of_cells, surfaces->vertices);
     now.dissipation -= fluid.viscosity() * surface_gradient_work(*surfaces);
   }
   if (auto* membranes = simulation_.membranes()) {

@@ -24,7 +24,8 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
   bodies_.growth = Array<double>("corpuscle::immersed::growth", surfaces.bodies);
   mean_velocity_ = Table<double>("corpuscle::immersed::mean_velocity", surfaces.bodies, 3);
   traction_ = Components<double>("corpuscle::coupling::traction", surfaces.vertices, 3);
-  traction_host_ = Kokkos::create_mirror_view(traction_);
+  stress_ = make_surface_stress("corpuscle::coupling::stress", surfaces.vertices);
+  if (fluid.grid().comm().size() > 1) found_host_ = HostCopy(boundary_->found_stress().values);
 }
 
 /// The lowest vertex that no rank finds in its block. For error messages: copies to the host.
@@ -160,22 +161,22 @@ void ImmersedFlow::solve(double time) {
   fluid_.solve(time, &bodies_);
 }
 
-const Components<double>& ImmersedFlow::tractions() {
+const SurfaceStress& ImmersedFlow::tractions() {
   const auto scope = timers_.scope("tractions");
   TractionInput input;
   input.u = fluid_.velocity();
   input.p = fluid_.pressure();
   input.viscosity = fluid_.viscosity();
   input.pressure_gradient = fluid_.imposed_gradient();
-  const auto& own = boundary_->tractions(input);
-  if (fluid_.grid().comm().size() == 1) {
-    Kokkos::deep_copy(traction_, own.total);
-  } else {
-    Kokkos::deep_copy(traction_host_, own.total);
-    fluid_.grid().comm().sum(traction_host_.data(), static_cast<int>(traction_host_.span()));
-    Kokkos::deep_copy(traction_, traction_host_);
+  boundary_->find_stress(input);
+  const Comm& comm = fluid_.grid().comm();
+  if (comm.size() > 1) {
+    const auto& own = found_host_.read();
+    comm.sum(own.data(), static_cast<int>(own.span()));
+    found_host_.write();
   }
-  return traction_;
+  complete_stress(surfaces_, boundary_->found_stress(), stress_, traction_);
+  return stress_;
 }
 
 std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>& centre) {
@@ -185,7 +186,7 @@ std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>
   for (int b = 0; b < surfaces_.bodies; ++b)
     for (int m = 0; m < 3; ++m) at_host(b, m) = centre[b][m];
   Kokkos::deep_copy(at, at_host);
-  boundary_->loads(traction_, at, loads);
+  body_loads(surfaces_, stress_, at, loads);
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), loads);
   std::vector<std::array<Triple, 2>> result(surfaces_.bodies);
   for (int b = 0; b < surfaces_.bodies; ++b)

@@ -33,10 +33,11 @@ class ImmersedFlow {
   void update_geometry(double smallest_gap);
   /// Solve the flow with the surfaces' present velocities.
   void solve(double time_us);
-  /// Traction of the fluid on every vertex, [vertex, 3] kPa, the same on all ranks.
-  const Components<double>& tractions();
+  /// Stress of the fluid at every vertex, the same on all ranks.
+  const SurfaceStress& tractions();
 
-  /// The last tractions, zero before the first.
+  /// The last of these, zero before the first, and as tractions -p n + viscous part, [vertex, 3] kPa.
+  const SurfaceStress& last_stress() const { return stress_; }
   const Components<double>& last_tractions() const { return traction_; }
 
   /// Force and torque (about `centre`, [body]) of each body from the last tractions, nN and nN um.
@@ -67,8 +68,9 @@ class ImmersedFlow {
   std::unique_ptr<ImmersedBoundary> boundary_;
   EmbeddedBodies bodies_;
   Table<double> mean_velocity_;  // [body, 3] um/us
+  SurfaceStress stress_;
   Components<double> traction_;
-  HostMirror<Components<double>> traction_host_;
+  HostCopy<Components<double>> found_host_;
   ImmersedReport report_;
 };
 

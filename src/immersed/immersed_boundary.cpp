@@ -102,9 +102,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   row_counts_ = make<Array<int>>("row_counts", 2 * row_kinds);
   traction_counts_ = make<Array<int>>("traction_counts", static_cast<int>(traction_counts));
   faces_.start = make<Array<int>>("face_start", surface.bodies + 1);
-  tractions_ = {make<Components<double>>("traction", surface.vertices, 3),
-                make<Components<double>>("traction_pressure", surface.vertices, 3),
-                make<Components<double>>("traction_viscous", surface.vertices, 3)};
+  stress_ = make_surface_stress("corpuscle::immersed::stress_vertex", surface.vertices);
   if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
   box_host_ = HostCopy(places_.box);
   found_host_ = HostCopy(places_.found);
@@ -276,19 +274,14 @@ void ImmersedBoundary::extend_pressure(const Array<double>& p) const {
   apply_pressure_rows(pressure_, counts_.immersed, p);
 }
 
-const TractionOutput& ImmersedBoundary::tractions(const TractionInput& fields) {
-  corpuscle::tractions(input(), places_, fields, options_.traction, tractions_, traction_counts_);
-  return tractions_;
+const SurfaceStress& ImmersedBoundary::find_stress(const TractionInput& fields) {
+  tractions(input(), places_, fields, options_.traction, stress_, traction_counts_);
+  return stress_;
 }
 
 std::vector<int> ImmersedBoundary::traction_fallbacks() const {
   const auto counts = to_host(traction_counts_);
   return {counts.data(), counts.data() + counts.extent(0)};
-}
-
-void ImmersedBoundary::loads(const Components<double>& traction, const Components<double>& centre,
-                             const Components<double>& loads) const {
-  body_loads(surface_, traction, centre, loads);
 }
 
 Slip ImmersedBoundary::slip(const Components<double>& u) const {

@@ -66,13 +66,11 @@ class ImmersedBoundary {
   /// p at immersed nodes from the fluid.
   void extend_pressure(const Array<double>& p) const;
 
-  /// Traction on the vertices this rank owns, zero on the others: add up over ranks. See TractionInput for units.
-  const TractionOutput& tractions(const TractionInput& fields);
-  /// How the last tractions came about, by TractionFallback; copies to the host.
+  /// Stress at the vertices that this rank owns, zero at the others: add up over ranks, then complete_stress().
+  const SurfaceStress& find_stress(const TractionInput& fields);
+  const SurfaceStress& found_stress() const { return stress_; }
+  /// How the last stress came about, by TractionFallback; copies to the host.
   std::vector<int> traction_fallbacks() const;
-  /// Force and torque of each body from tractions that were added up over ranks. centre, loads: [body, 3], [body, 6].
-  void loads(const Components<double>& traction, const Components<double>& centre,
-             const Components<double>& loads) const;
   Slip slip(const Components<double>& u) const;
 
   const NodeViews& nodes() const { return nodes_; }
@@ -132,7 +130,7 @@ class ImmersedBoundary {
   FootViews feet_;
   Components<double> u_surface_;
   FaceViews faces_;
-  TractionOutput tractions_;
+  SurfaceStress stress_;
   NodeBox last_box_;
   ImmersedCounts counts_;
 };

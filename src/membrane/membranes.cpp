@@ -125,22 +125,22 @@ void Membranes::take_substeps(int count, double dt, const Load& load) {
   }
 }
 
-void Membranes::take_substeps(int count, double dt, const Components<double>& traction, double beta,
+void Membranes::take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                               const Components<double>& v_star) {
-  if (traction.extent(0) == 0) {
+  if (stress.values.extent(0) == 0) {
     take_substeps(count, dt, NoLoad{});
   } else if (beta == 0) {
-    take_substeps(count, dt, TractionLoad{traction});
+    take_substeps(count, dt, FluidLoad{stress});
   } else {
-    take_substeps(count, dt, RobinLoad{traction, v_star, beta});
+    take_substeps(count, dt, RobinLoad{{stress}, v_star, beta});
   }
 }
 
-int Membranes::advance(double dt_us, const Components<double>& traction, double beta,
+int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
                        const Components<double>& v_star) {
   if (views_.cells == 0) return 0;
-  if (beta > 0 && (traction.extent(0) == 0 || v_star.extent(0) == 0)) {
-    throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both traction and v_star");
+  if (beta > 0 && (stress.values.extent(0) == 0 || v_star.extent(0) == 0)) {
+    throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both stress and v_star");
   }
   if (calls_ % estimate_period == 0) estimate_stiffness();
   ++calls_;
@@ -151,7 +151,7 @@ int Membranes::advance(double dt_us, const Components<double>& traction, double 
   for (int attempt = 0; attempt <= most_retries; ++attempt) {
     const int count = planned << attempt;
     Kokkos::deep_copy(views_.status, 0);
-    take_substeps(count, dt_us / count, traction, beta, v_star);
+    take_substeps(count, dt_us / count, stress, beta, v_star);
     if (trouble() < 0) return count;
     copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   }
@@ -160,7 +160,7 @@ int Membranes::advance(double dt_us, const Components<double>& traction, double 
   Kokkos::deep_copy(views_.status, 0);
   int cell = -1;
   for (int s = 0; s < count && cell < 0; ++s) {
-    take_substeps(1, dt_us / count, traction, beta, v_star);
+    take_substeps(1, dt_us / count, stress, beta, v_star);
     cell = trouble();
   }
   explain(cell, dt_us);

@@ -62,19 +62,20 @@ class Membranes {
   const MembraneViscosity* viscosity() const { return viscosity_.get(); }
 
   /// Advance all cells by `dt_us` with symplectic Euler in equal sub-steps dt_s, each of which solves
-  ///   (M/dt_s + beta A + D) v = M v/dt_s + F(x) + A t + beta A v_star,
+  ///   (M/dt_s + beta A + D) v = M v/dt_s + F(x) + F_fluid(x) + beta A v_star,
   /// projects v so that the volume stays V0, and moves x += dt_s v. D, the membrane viscosity, is implicit.
   /// The sub-step is that of a vertex whose mass and drag see a stiffness 1/0.09 times the largest estimated: without
   /// beta this is 0.3 x 2/omega_max, and where beta dominates 0.18 beta A/k, which resolves the fastest relaxation.
   /// The stiffness is estimated anew every 100th call. A step that overstretches a link is tried again from the start
   /// with 2, 4, 8 and 16 times as many sub-steps.
-  /// @param traction  [vertex, 3] kPa, or an empty view
+  /// The level of the pressure has no effect.
+  /// @param stress    of the fluid at the vertices, or without values
   /// @param beta      pg/um2/us, 0 for none
   /// @param v_star    [vertex, 3] um/us, read only if beta > 0
   /// @return the number of sub-steps taken
   /// @throws ComputationError  naming the cell, the quantity, the likely cause and the setting to change; positions and
   ///         velocities are then those from before the call
-  int advance(double dt_us, const Components<double>& traction = {}, double beta = 0,
+  int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0,
               const Components<double>& v_star = {});
 
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
@@ -101,7 +102,7 @@ class Membranes {
   };
 
   void estimate_stiffness();
-  void take_substeps(int count, double dt, const Components<double>& traction, double beta,
+  void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                      const Components<double>& v_star);
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);

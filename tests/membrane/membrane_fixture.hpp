@@ -46,6 +46,23 @@ inline Components<double> make_field(const std::vector<Vec3>& values) {
   return view;
 }
 
+/// Stress of a fluid with the given pressures and viscous tractions at the vertices, kPa.
+inline SurfaceStress make_stress(const std::vector<double>& pressure, const std::vector<Vec3>& viscous) {
+  const SurfaceStress stress = make_surface_stress("corpuscle::test::stress", int(pressure.size()));
+  const auto host = Kokkos::create_mirror_view(stress.values);
+  for (std::size_t i = 0; i < pressure.size(); ++i) {
+    host(i, 0) = pressure[i];
+    for (int d = 0; d < 3; ++d) host(i, 1 + d) = viscous[i][d];
+  }
+  Kokkos::deep_copy(stress.values, host);
+  return stress;
+}
+
+/// Viscous tractions alone.
+inline SurfaceStress make_stress(const std::vector<Vec3>& viscous) {
+  return make_stress(std::vector<double>(viscous.size(), 0.0), viscous);
+}
+
 /// Uniform in [-1, 1] and the same on every platform.
 class Noise {
  public:

@@ -90,7 +90,7 @@ TEST_CASE("measured membrane viscosity is stable at real mass and 1 us") {
   double previous = start;
   int most = 0;
   for (int i = 0; i < 20; ++i) {
-    m.advance(1.0, still, 10, still);
+    m.advance(1.0, make_stress(none), 10, still);
     most = std::max(most, m.viscosity()->iterations());
     const double now = m.diagnostics()[0].energy_fJ() - rest;
     REQUIRE(now < previous * (1 + 1e-6));  // dissipation only; the explicit limit is 1.4e-4 us
@@ -111,7 +111,7 @@ TEST_CASE("a small viscosity changes little") {
   }()});
   std::vector<Vec3> pull;
   for (const Vec3& p : to_host(dry.surfaces().x, dry.vertices())) pull.push_back(0.01 * Vec3{std::sin(p.x), 0, 0});
-  const auto traction = make_field(pull);
+  const auto traction = make_stress(pull);
   for (int i = 0; i < 10; ++i) {
     dry.advance(1.0, traction);
     wet.advance(1.0, traction);
