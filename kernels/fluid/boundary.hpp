@@ -79,6 +79,11 @@ inline void spread_flux(const IndexSpace& index, const CellBox& faces, double pe
   });
 }
 
+inline void clear_flux(const IndexSpace& index, const CellBox& faces, const Array<double>& flux) {
+  for_box("corpuscle::fluid::closed_faces", faces.lower, faces.upper,
+          KOKKOS_LAMBDA(int i, int j, int k) { flux(index.cell(i, j, k)) = 0; });
+}
+
 /// mask = 1 over a box.
 template <class Mask>
 void mark_box(const IndexSpace& index, const CellBox& box, const Mask& mask) {

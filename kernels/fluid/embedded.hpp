@@ -14,6 +14,7 @@ struct EmbeddedBodies {
   StencilViews pressure;            // p_row = sum of weight p[column]
   int bodies = 0;
   FaceViews faces;                  // sorted by body
+  Images images;                    // shifts that faces.image numbers, um
   Array<double> growth;             // [body] rate of change of its volume, um3/us
 };
 

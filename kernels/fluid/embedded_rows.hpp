@@ -19,7 +19,8 @@ void apply_homogeneous_rows(const EmbeddedBodies& b, const Velocity& u) {
   });
 }
 
-/// sums [body, 2] = flux into the fluid through the faces of each body, and their total area, over this rank's faces.
+/// sums [body, 2] = flux into the fluid through the faces of each body, and their total area, over the faces that this rank
+/// counts.
 inline void body_flux_sums(const GridViews& grid, const EmbeddedBodies& b, const Array<double> (&flux)[3],
                            const Table<double>& sums) {
   const auto f0 = flux[0], f1 = flux[1], f2 = flux[2];
@@ -36,14 +37,14 @@ inline void body_flux_sums(const GridViews& grid, const EmbeddedBodies& b, const
             Kokkos::TeamThreadRange(team, start(body), start(body + 1)),
             [&](int n, double& sum) {
               const int d = face.direction(n), c = face.cell(n);
-              sum += face.sign(n) * (d == 0 ? f0 : (d == 1 ? f1 : f2))(c);
+              sum += face.counted(n) * face.sign(n) * (d == 0 ? f0 : (d == 1 ? f1 : f2))(c);
             },
             into);
         Kokkos::parallel_reduce(
             Kokkos::TeamThreadRange(team, start(body), start(body + 1)),
             [&](int n, double& sum) {
               const int d = face.direction(n), c = face.cell(n);
-              sum += norm(load(d == 0 ? area0 : (d == 1 ? area1 : area2), c));
+              sum += face.counted(n) * norm(load(d == 0 ? area0 : (d == 1 ? area1 : area2), c));
             },
             total);
         Kokkos::single(Kokkos::PerTeam(team), [&]() {

@@ -132,6 +132,7 @@ void momentum_balance(const GridViews& grid, const ViscousCoefficients& g, const
   const auto x = grid.x;
   const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
   const FaceViews face = b.faces;
+  const Images images = b.images;
   const auto start = face.start;
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   Kokkos::parallel_for(
@@ -145,7 +146,9 @@ void momentum_balance(const GridViews& grid, const ViscousCoefficients& g, const
               [&](int n, double& sum) {
                 const int d = face.direction(n), c = face.cell(n), stride = index.stride(d), sign = face.sign(n);
                 const int fluid = sign > 0 ? c : c - stride, beyond = fluid + sign * stride;
-                const Vec3 at = 0.5 * (load(x, c) + load(x, c - stride));
+                if (face.counted(n) == 0) return;
+                // Where the body is, not its image: across a periodic side the imposed pressure jumps.
+                const Vec3 at = 0.5 * (load(x, c) + load(x, c - stride)) - images.shift[face.image(n)];
                 const double p_face =
                     (mask(beyond) ? p(fluid) + 0.5 * (p(fluid) - p(beyond)) : p(fluid)) + dot(gradient, at);
                 const double s = (d == 0 ? area0 : (d == 1 ? area1 : area2))(c, m);

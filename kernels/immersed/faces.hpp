@@ -5,33 +5,46 @@
 
 namespace corpuscle {
 
+/// A face that two ranks share, or the two ends of a periodic direction, is stored on both sides: both list it, so that
+/// both copies get the same flux, and the owner of the fluid node counts it in sums.
 struct FaceViews {
   Array<int> start;  // [bodies + 1] into the lists below
   Array<int> cell;   // face between cell - stride(direction) and cell
   Array<std::int8_t> direction;
-  Array<std::int8_t> sign;  // +1: the fluid node is on the high side, so a flux along +direction enters the fluid
+  Array<std::int8_t> sign;     // +1: the fluid node is on the high side, so a flux along +direction enters the fluid
+  Array<std::int8_t> counted;  // 1 where this rank owns the fluid node, else 0
+  Array<std::int8_t> image;    // under which the surface is seen here
   Array<int> body;
 };
 
-/// Faces of owned fluid node (i, j, k) that belong to `body`; calls `found(cell, direction, sign)` for each.
+/// Faces of fluid node i that belong to `body` and of which this rank owns at least one node; calls
+/// `found(cell, direction, sign, immersed)` for each.
 template <class Found>
-KOKKOS_INLINE_FUNCTION void node_faces(const IndexSpace& index, const NodeViews& nodes, int c, int body,
+KOKKOS_INLINE_FUNCTION void node_faces(const IndexSpace& index, const NodeViews& nodes, const int (&i)[3], int body,
                                        const Found& found) {
+  const int c = index.cell(i[0], i[1], i[2]);
   if (nodes.kind(c) != NodeKind::fluid) return;
+  const bool own = index.owns(i[0], i[1], i[2]);
   for (int d = 0; d < 3; ++d) {
     const int stride = index.stride(d);
-    if (nodes.kind(c - stride) == NodeKind::immersed && nodes.body(c - stride) == body) found(c, d, 1);
-    if (nodes.kind(c + stride) == NodeKind::immersed && nodes.body(c + stride) == body) found(c + stride, d, -1);
+    for (int step = -1; step <= 1; step += 2) {
+      int beside[3] = {i[0], i[1], i[2]};
+      beside[d] += step;
+      const int other = c + step * stride;
+      if (!own && !index.owns(beside[0], beside[1], beside[2])) continue;
+      if (nodes.kind(other) == NodeKind::immersed && nodes.body(other) == body)
+        found(step < 0 ? c : other, d, -step, other);
+    }
   }
 }
 
-/// The owned nodes that can have faces of a body.
+/// The nodes that can have faces of a body: owned ones and one layer around them.
 KOKKOS_INLINE_FUNCTION NodeBox body_box(const IndexSpace& index, const Array<int>& box, int body) {
   NodeBox b;
   for (int d = 0; d < 3; ++d) {
     const int offset = 6 * (1 + body);
-    b.lower[d] = box(offset + d) > 0 ? box(offset + d) : 0;
-    b.upper[d] = box(offset + 3 + d) < index.n[d] - 1 ? box(offset + 3 + d) : index.n[d] - 1;
+    b.lower[d] = box(offset + d) > -1 ? box(offset + d) : -1;
+    b.upper[d] = box(offset + 3 + d) < index.n[d] ? box(offset + 3 + d) : index.n[d];
   }
   return b;
 }
@@ -52,7 +65,7 @@ inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bod
             [&](int e, int& sum) {
               int i[3];
               box.unpack(e, i);
-              node_faces(index, in, index.cell(i[0], i[1], i[2]), body, [&](int, int, int) { ++sum; });
+              node_faces(index, in, i, body, [&](int, int, int, int) { ++sum; });
             },
             count);
         Kokkos::single(Kokkos::PerTeam(team), [&]() { start(body) = count; });
@@ -70,8 +83,10 @@ inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bod
 }
 
 /// Fills the lists, in ascending order of the fluid node within each body; the lists must be long enough.
-inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, const NodeViews& nodes,
-                       const FaceViews& faces) {
+/// @param key        [cell] the search's, at the immersed nodes
+/// @param triangles  of all surfaces
+inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, int triangles,
+                       const NodeViews& nodes, const Array<Key>& key, const FaceViews& faces) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const FaceViews out = faces;
   const NodeViews in = nodes;
@@ -82,12 +97,16 @@ inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bod
         Kokkos::parallel_scan(Kokkos::TeamThreadRange(team, box.size()), [&](int e, int& position, bool final) {
           int i[3];
           box.unpack(e, i);
-          node_faces(index, in, index.cell(i[0], i[1], i[2]), body, [&](int cell, int d, int sign) {
+          const bool own = index.owns(i[0], i[1], i[2]);
+          node_faces(index, in, i, body, [&](int cell, int d, int sign, int immersed) {
             if (final) {
               const int at = first + position;
               out.cell(at) = cell;
               out.direction(at) = static_cast<std::int8_t>(d);
               out.sign(at) = static_cast<std::int8_t>(sign);
+              out.counted(at) = own ? 1 : 0;
+              out.image(at) = static_cast<std::int8_t>(
+                  key(immersed) == no_key ? 0 : key_item(key(immersed)) / static_cast<unsigned>(triangles));
               out.body(at) = body;
             }
             ++position;

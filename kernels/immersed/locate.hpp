@@ -40,6 +40,11 @@ KOKKOS_INLINE_FUNCTION void grow_box(const Array<int>& box, int offset, const do
   }
 }
 
+/// The node next to a point along d. Rounded, so that ranks which see the same point under a shift agree on the tie.
+KOKKOS_INLINE_FUNCTION int nearest_node(const LatticePoint& q, int d) {
+  return q.base[d] + (std::floor(q.f[d] * 1073741824.0 + 0.5) >= 536870912.0 ? 1 : 0);
+}
+
 /// Fills every member of `places` but the boxes' initial values (see reset_places). A vertex is owned by the rank that
 /// owns the node nearest to it in index space; beyond a physical boundary it is owned by nobody and reported.
 inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const Images& images,
@@ -57,6 +62,7 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
           const bool far = p.x < options.lower.x || p.x > options.upper.x || p.y < options.lower.y ||
                            p.y > options.upper.y || p.z < options.lower.z || p.z > options.upper.z;
           const bool known = options.warm && out.status(item) != Located::failed;
+          const bool was_inside = known && out.status(item) == Located::inside;
           if (far) {
             out.status(item) = Located::failed;
             continue;
@@ -68,13 +74,14 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
             lattice.set(q, start);
             status = lattice.locate(p, q);
           }
-          if (status == Located::failed) {
+          // A point that was inside and has left, or was carried round a periodic direction: look everywhere.
+          if (status == Located::failed || (was_inside && status == Located::outside)) {
             lattice.coarse_start(p, q);
             status = lattice.locate(p, q);
           }
           out.status(item) = status;
           if (status == Located::failed) continue;
-          if (status == Located::inside) lattice.polish(p, q);
+          lattice.polish(p, q);
 
           const double xi[3] = {q.xi(0), q.xi(1), q.xi(2)};
           LatticePoint near = q;  // tangents where the lattice ends, not extrapolated ones
@@ -90,8 +97,7 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
           for (int d = 0; d < 3; ++d) {
             out.xi(item, d) = xi[d];
             out.pad(item, d) = pad[d];
-            // Rounded, so that ranks which see the same point under a shift agree on the tie.
-            const int nearest = q.base[d] + (std::floor(q.f[d] * 1073741824.0 + 0.5) >= 536870912.0 ? 1 : 0);
+            const int nearest = nearest_node(q, d);
             const bool below = lattice.boundary_below[d] && xi[d] < -1,
                        above = lattice.boundary_above[d] && xi[d] > lattice.index.n[d];
             beyond = beyond || below || above;
@@ -118,6 +124,35 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
           grow_box(out.box, 6 * (1 + body(v)), xi, pad);
         }
       });
+}
+
+/// Smallest distance between neighbouring nodes, over directions, at the nodes nearest to the vertices owned here, um. The
+/// same whatever the decomposition: a vertex's owner holds its nearest node.
+inline double smallest_spacing_at(const Lattice& lattice, int vertices, const PlaceViews& places) {
+  const PlaceViews in = places;
+  double smallest = 1e300;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::smallest_spacing", Policy(0, vertices),
+      KOKKOS_LAMBDA(int v, double& least) {
+        if (in.image(v) < 0) return;
+        const int item = in.image(v) * vertices + v;
+        const double xi[3] = {in.xi(item, 0), in.xi(item, 1), in.xi(item, 2)};
+        LatticePoint q;
+        lattice.set(q, xi);
+        int at[3];
+        for (int d = 0; d < 3; ++d) {
+          at[d] = nearest_node(q, d);
+          at[d] = at[d] < 0 ? 0 : (at[d] < lattice.index.n[d] ? at[d] : lattice.index.n[d] - 1);
+        }
+        const int c = lattice.node(at[0], at[1], at[2]);
+        for (int d = 0; d < 3; ++d) {
+          const double spacing = 0.5 * norm(lattice.position(c + lattice.index.stride(d)) -
+                                            lattice.position(c - lattice.index.stride(d)));
+          least = spacing < least ? spacing : least;
+        }
+      },
+      Kokkos::Min<double>(smallest));
+  return smallest;
 }
 
 }  // namespace corpuscle

@@ -111,11 +111,12 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   }
 }
 
-HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d) const {
+/// @param travelled  by how much the cell has been moved back through periodic sides, um
+HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const {
   HistorySample sample;
   sample.time_us = simulation_.time();
   sample.cell = cell;
-  sample.centroid_um = d.centroid_um;
+  sample.centroid_um = {d.centroid_um[0] + travelled[0], d.centroid_um[1] + travelled[1], d.centroid_um[2] + travelled[2]};
   sample.velocity_um_per_us = d.velocity_um_per_us;
   sample.extent_um = d.extent_um();
   sample.area_um2 = d.area_um2;
@@ -138,8 +139,9 @@ void FlowOutput::write_history() {
     watch_cells(cells);
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
+    const auto travelled = simulation_.immersed()->wrapped_by();
     for (int c = 0; c < simulation_.cells(); ++c) {
-      auto sample = cell_sample(c, cells[c]);
+      auto sample = cell_sample(c, cells[c], travelled[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape + balance, none);
       history_->write(sample);
       last_.push_back(sample);

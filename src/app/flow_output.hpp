@@ -41,7 +41,7 @@ class FlowOutput {
   void write_cells();
   void fill_energy(Report& report) const;
   void fill_quantities(Report& report) const;
-  HistorySample cell_sample(int cell, const CellDiagnostics& d) const;
+  HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
   std::string folder_;

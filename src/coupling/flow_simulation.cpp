@@ -1,6 +1,7 @@
 #include "coupling/flow_simulation.hpp"
 
 #include "core/error.hpp"
+#include "core/units.hpp"
 #include "immersed/surface_motion.hpp"
 #include "membrane/interface.hpp"
 
@@ -30,6 +31,15 @@ FluidSettings fluid_settings(const Case& scene) {
   return settings;
 }
 
+/// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to
+/// its shape. Tolerances relative to the speed of a flow at rest would ask for less than round-off.
+double negligible_speed(const Case& scene) {
+  constexpr double share = 1e-4;
+  double modulus = 0;
+  for (const auto& cell : scene.cells) modulus = std::max(modulus, cell.shear_modulus_uN_per_m * units::uN_per_m);
+  return share * modulus / (scene.fluid->density_pg_per_um3 * scene.fluid->kinematic_viscosity_um2_per_us);
+}
+
 }  // namespace
 
 FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers)
@@ -41,6 +51,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   make_surfaces();
   immersed_ = std::make_unique<ImmersedFlow>(*fluid_, *surfaces_, timers_);
   if (rigid_bodies_) fluid_->raise_reference_speed(rigid_bodies_->largest_speed());
+  if (membranes_) fluid_->raise_reference_speed(quiet_speed_ = negligible_speed(scene));
   check_start();
   if (!membranes_) return;
   measure_stability();
@@ -73,6 +84,7 @@ void FlowSimulation::make_surfaces() {
 }
 
 void FlowSimulation::check_start() {
+  immersed_->boundary().wrap(0, surfaces_->bodies, true);
   try {
     immersed_->update_geometry(starting_gap);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
@@ -132,7 +144,8 @@ void FlowSimulation::require_stability(const StabilityEstimate& s) const {
 void FlowSimulation::watch_growth(double change, double speed_square) {
   constexpr int most = 10;
   constexpr double unrelated = 0.9;
-  if (!(change > unrelated)) {
+  const bool at_rest = speed_square < membranes_->vertices() * quiet_speed_ * quiet_speed_;
+  if (!(change > unrelated) || at_rest) {
     swings_ = 0;
     return;
   }
@@ -165,9 +178,14 @@ void FlowSimulation::step() {
   last_step_ = dt;
 }
 
+void FlowSimulation::move_rigid_bodies(double time) {
+  rigid_bodies_->move_to(time);
+  immersed_->boundary().wrap(surfaces_->cells, surfaces_->bodies, true);
+}
+
 void FlowSimulation::step_rigid(double dt) {
   if (rigid_bodies_->moving()) {
-    rigid_bodies_->move_to(time_ + dt);
+    move_rigid_bodies(time_ + dt);
     immersed_->update_geometry(smallest_gap);
   }
   immersed_->solve(time_ + dt);
@@ -175,9 +193,10 @@ void FlowSimulation::step_rigid(double dt) {
 
 /// Nodes are classified once a step, where the surfaces are expected at its end.
 void FlowSimulation::place_bodies(double dt) {
+  immersed_->boundary().wrap(0, surfaces_->cells, false);
   copy_vertices(membranes_->vertices(), surfaces_->x, x_start_);
   predict_positions(*surfaces_, membranes_->vertices(), dt);
-  if (rigid_bodies_) rigid_bodies_->move_to(time_ + dt);
+  if (rigid_bodies_) move_rigid_bodies(time_ + dt);
   immersed_->update_geometry(smallest_gap);
 }
 
@@ -227,7 +246,7 @@ void FlowSimulation::step_iterated(double dt) {
     mean_velocity(n, surfaces_->x, x_start_, dt, v_answer_);
     const auto norms = interface_residual(n, v_answer_, v_interface_, previous_residual_, residual_);
     statistics_.coupling_iterations = k + 1;
-    residual = norms.answer > 0 ? std::sqrt(norms.residual / norms.answer) : 0;
+    residual = std::sqrt(norms.residual / std::max(norms.answer, n * quiet_speed_ * quiet_speed_));
     statistics_.coupling_residual = residual;
     if (!std::isfinite(residual)) break;
     if (residual <= coupling.tolerance) return;

@@ -79,6 +79,7 @@ class FlowSimulation {
   void step_staggered(double dt);
   void step_iterated(double dt);
   void place_bodies(double dt);
+  void move_rigid_bodies(double time_us);
 
   Case scene_;
   Timers& timers_;
@@ -93,6 +94,7 @@ class FlowSimulation {
   StabilityEstimate stability_;
   double least_mass_per_area_ = 1e300, added_mass_per_area_ = 0, smallest_spacing_ = 0;  // pg/um2, pg/um2, um
   StepStatistics statistics_;
+  double quiet_speed_ = 0;  // um/us, below which cells count as at rest
   int swings_ = 0;
   double swing_start_ = 0;  // sum of the vertices' squared speeds when they began
   StepSchedule schedule_;

@@ -11,16 +11,42 @@
 
 namespace corpuscle {
 
+namespace {
+
+Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
+
+/// The vectors dual to the periods, in the space that they span: from the adjugate of their Gram matrix, in which
+/// directions that are not periodic have a one.
+PeriodicFrame periodic_frame(const Grid& grid) {
+  PeriodicFrame frame;
+  frame.origin = to_vec3(grid.corner());
+  double gram[3][3] = {};
+  for (int d = 0; d < 3; ++d) {
+    frame.periodic[d] = grid.index().periodic[d];
+    if (frame.periodic[d]) frame.period[d] = to_vec3(grid.period(d));
+  }
+  for (int d = 0; d < 3; ++d)
+    for (int e = 0; e < 3; ++e)
+      gram[d][e] = frame.periodic[d] && frame.periodic[e] ? dot(frame.period[d], frame.period[e]) : (d == e ? 1.0 : 0.0);
+  const DualBasis inverse({gram[0][0], gram[0][1], gram[0][2]}, {gram[1][0], gram[1][1], gram[1][2]},
+                          {gram[2][0], gram[2][1], gram[2][2]});
+  for (int d = 0; d < 3; ++d)
+    for (int e = 0; e < 3; ++e) frame.dual[d] += inverse.b[d][e] * frame.period[e];
+  for (int d = 0; d < 3; ++d)
+    if (!frame.periodic[d]) frame.dual[d] = {};
+  return frame;
+}
+
+}  // namespace
+
 ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers)
     : fluid_(fluid), surfaces_(surfaces), timers_(timers) {
   ImmersedOptions options;
   for (int side = 0; side < 6; ++side) options.wall[side] = fluid.boundaries().is_wall(side);
-  for (int d = 0; d < 3; ++d) {
-    const Triple& p = fluid.grid().period(d);
-    options.period[d] = {p[0], p[1], p[2]};
-  }
+  options.frame = periodic_frame(fluid.grid());
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;
+  bodies_.images = boundary_->images();
   bodies_.growth = Array<double>("corpuscle::immersed::growth", surfaces.bodies);
   mean_velocity_ = Table<double>("corpuscle::immersed::mean_velocity", surfaces.bodies, 3);
   traction_ = Components<double>("corpuscle::coupling::traction", surfaces.vertices, 3);
@@ -39,9 +65,11 @@ int ImmersedFlow::first_unowned_vertex() {
 void ImmersedFlow::check_positions(double smallest_gap) {
   const auto& counts = boundary_->counts();
   const Comm& comm = fluid_.grid().comm();
-  double worst[4] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
-                     static_cast<double>(counts.crossed_links), -counts.body_spacings};
-  comm.max(worst, 4);
+  double worst[5] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
+                     static_cast<double>(counts.crossed_links), -counts.body_spacings,
+                     static_cast<double>(counts.uncovered)};
+  comm.max(worst, 5);
+  any_uncovered_ = worst[4] > 0;
   const double to_wall = -worst[1], between = -worst[3];
   report_.least_wall_spacings = std::min(report_.least_wall_spacings, to_wall);
   report_.least_body_spacings = std::min(report_.least_body_spacings, between);
@@ -130,6 +158,10 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   check_positions(smallest_gap);
   const bool first = report_.classifications == 0;
   if (first) check_resolution();
+  fluid_.grid().halo().exchange(boundary_->nodes().kind);
+  fluid_.grid().halo().exchange(boundary_->nodes().body);
+  if (any_uncovered_) fluid_.mend_pressure([&](const Array<double>& p) { boundary_->fill_uncovered(p); });
+  boundary_->find_faces();
   boundary_->build_stencils();
   const auto& counts = boundary_->counts();
   report_.classifications += 1;
@@ -145,7 +177,6 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   bodies_.u_surface = boundary_->surface_velocity();
   bodies_.faces = boundary_->faces();
   const auto matrix = timers_.scope("pressure matrix");
-  fluid_.grid().halo().exchange(boundary_->nodes().kind);
   fluid_.set_kinds(boundary_->nodes().kind);
   if (first) fluid_.check_connected();
 }
@@ -183,8 +214,9 @@ std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>
   Components<double> at("corpuscle::immersed::centre", surfaces_.bodies, 3);
   Components<double> loads("corpuscle::immersed::loads", surfaces_.bodies, 6);
   auto at_host = Kokkos::create_mirror_view(at);
+  const auto shift = wrapped_by();
   for (int b = 0; b < surfaces_.bodies; ++b)
-    for (int m = 0; m < 3; ++m) at_host(b, m) = centre[b][m];
+    for (int m = 0; m < 3; ++m) at_host(b, m) = centre[b][m] - shift[b][m];
   Kokkos::deep_copy(at, at_host);
   body_loads(surfaces_, stress_, at, loads);
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), loads);
@@ -194,20 +226,14 @@ std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>
   return result;
 }
 
-double ImmersedFlow::smallest_spacing_at_surfaces() {
-  const IndexSpace& index = fluid_.grid().index();
-  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), fluid_.grid().views().x);
-  const auto xi = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), boundary_->places().xi);
-  const auto owned = boundary_->owned_vertices();
-  double smallest = 1e300;
-  for (std::size_t v = 0; v < owned.size(); ++v) {
-    if (!owned[v]) continue;
-    int at[3];
-    for (int d = 0; d < 3; ++d) at[d] = std::clamp(static_cast<int>(std::lround(xi(v, d))), 0, index.n[d] - 1);
-    const int c = index.cell(at[0], at[1], at[2]);
-    for (int d = 0; d < 3; ++d) smallest = std::min(smallest, norm(central_offset(x, c, index.stride(d))));
-  }
-  return fluid_.grid().comm().min(smallest);
+std::vector<Triple> ImmersedFlow::wrapped_by() const {
+  std::vector<Triple> shift(surfaces_.bodies, Triple{});
+  if (!boundary_->periodic()) return shift;
+  const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), boundary_->laps());
+  for (int b = 0; b < surfaces_.bodies; ++b)
+    for (int d = 0; d < 3; ++d)
+      for (int m = 0; m < 3; ++m) shift[b][m] += laps(b, d) * fluid_.grid().period(d)[m];
+  return shift;
 }
 
 std::array<double, 2> ImmersedFlow::slip() {

@@ -40,15 +40,18 @@ class ImmersedFlow {
   const SurfaceStress& last_stress() const { return stress_; }
   const Components<double>& last_tractions() const { return traction_; }
 
-  /// Force and torque (about `centre`, [body]) of each body from the last tractions, nN and nN um.
+  /// Force and torque (about `centre`, [body], where the body would be had it not been moved back by periods) of each body
+  /// from the last tractions, nN and nN um.
   std::vector<std::array<Triple, 2>> loads(const std::vector<Triple>& centre);
   /// The same forces from the fluid's momentum balance over the faces around each body.
   std::vector<Triple> balance_forces() { return fluid_.body_forces(bodies_); }
   /// Largest and rms difference between the fluid's velocity carried to the surface and the surface's own, um/us.
   std::array<double, 2> slip();
 
-  /// Smallest grid spacing, over directions and the surfaces' present vertices, um. Copies to the host: for set-up.
-  double smallest_spacing_at_surfaces();
+  /// Smallest grid spacing, over directions and the surfaces' present vertices, um.
+  double smallest_spacing_at_surfaces() { return fluid_.grid().comm().min(boundary_->smallest_spacing()); }
+  /// How far each body has been moved back by whole periods since the start, um; copies to the host.
+  std::vector<Triple> wrapped_by() const;
 
   const ImmersedReport& report() const { return report_; }
   FluidSolver& fluid() { return fluid_; }
@@ -72,6 +75,7 @@ class ImmersedFlow {
   Components<double> traction_;
   HostCopy<Components<double>> found_host_;
   ImmersedReport report_;
+  bool any_uncovered_ = false;  // on any rank, at the last classification
 };
 
 }  // namespace corpuscle

@@ -99,6 +99,10 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const auto places = simulation.immersed()->boundary().location_state();
     file.add("locations", {places.size()}, places.data());
   }
+  if (simulation.immersed() && simulation.immersed()->boundary().periodic()) {
+    const auto laps = simulation.immersed()->boundary().laps_state();
+    file.add("laps", {laps.size()}, laps.data());
+  }
   file.commit();
 }
 
@@ -156,6 +160,11 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
     std::vector<double> places(simulation.immersed()->boundary().location_state().size());
     file.read("locations", {places.size()}, places.data());
     simulation.immersed()->boundary().set_location_state(places);
+  }
+  if (simulation.immersed() && simulation.immersed()->boundary().periodic()) {
+    auto laps = simulation.immersed()->boundary().laps_state();
+    file.read("laps", {laps.size()}, laps.data());
+    simulation.immersed()->boundary().set_laps_state(laps);
   }
   fluid.restore(state);
 }

@@ -86,6 +86,7 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     sides_.push_back(side);
     prescribed_ = prescribed_ || s.type == Type::velocity_inlet || s.type == Type::moving_wall;
     has_outflow_ = has_outflow_ || s.type == Type::outflow;
+    has_inlet_ = has_inlet_ || s.type == Type::velocity_inlet;
     natural_[side.d][side.end] = s.type == Type::outflow || s.type == Type::symmetry;
   }
   std::stable_sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
@@ -212,12 +213,16 @@ void BoundaryConditions::clear_natural(const Components<float>& u) const {
     if (side.here && natural_[side.d][side.end]) fill_zero(grid_->index(), side.box, u);
 }
 
+void BoundaryConditions::close_moving_walls(const Array<double> (&flux)[3]) const {
+  for (const auto& side : sides_)
+    if (side.here && side.settings.type == Type::moving_wall) clear_flux(grid_->index(), side.faces, flux[side.d]);
+}
+
 double BoundaryConditions::balance(const Array<double> (&flux)[3], double growth) const {
-  if (has_outflow_ || !prescribed_) return 0;
   double sums[2] = {0, 0};
   const auto visit = [&](const auto& body) {
     for (const auto& side : sides_)
-      if (side.here && (side.settings.type == Type::velocity_inlet || side.settings.type == Type::moving_wall))
+      if (side.here && side.settings.type == Type::velocity_inlet)
         body(side, side.end == 0 ? -1.0 : 1.0, grid_->views().face_area[side.d], flux[side.d]);
   };
   visit([&](const Side& side, double outward, const Components<double>& area, const Array<double>& f) {

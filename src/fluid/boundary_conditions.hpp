@@ -21,13 +21,16 @@ class BoundaryConditions {
   /// Zero where fill_homogeneous() may have put something else.
   void clear_natural(const Components<float>& u) const;
 
-  /// Without an outflow the prescribed velocities must carry exactly `growth` (um3/us, of the bodies inside) out of the
-  /// block. Spreads what is missing evenly over the prescribed sides and returns it over their area, um/us.
+  /// No flux through moving walls: on a curved one the velocity given at a face's centre is not quite along it.
+  void close_moving_walls(const Array<double> (&flux)[3]) const;
+  /// Where there is no outflow, the inlets must carry exactly `growth` (um3/us, of the bodies inside) out of the block.
+  /// Spreads what is missing evenly over them and returns it over their area, um/us. @pre has_inlet()
   double balance(const Array<double> (&flux)[3], double growth) const;
 
   /// [cell] 1 at boundary nodes of outflow sides, where pressure is given.
   const PressureMask& outflow() const { return outflow_; }
   bool has_outflow() const { return has_outflow_; }
+  bool has_inlet() const { return has_inlet_; }
   /// [direction][low, high] sides with a condition on the velocity's derivative: outflow and symmetry.
   const bool (&natural() const)[3][2] { return natural_; }
   /// Largest prescribed speed at any time, um/us.
@@ -57,7 +60,7 @@ class BoundaryConditions {
   std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges
   PressureMask outflow_;
   Components<double> profile_, given_;
-  bool has_outflow_ = false, prescribed_ = false, natural_[3][2] = {};
+  bool has_outflow_ = false, has_inlet_ = false, prescribed_ = false, natural_[3][2] = {};
   double largest_speed_ = 0;
 };
 

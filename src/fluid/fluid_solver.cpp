@@ -101,6 +101,12 @@ void FluidSolver::set_kinds(const Array<NodeKind>& kind) {
   update_pressure_equation();
 }
 
+void FluidSolver::mend_pressure(const std::function<void(const Array<double>&)>& change) {
+  change(p_);
+  grid_->halo().exchange(p_);
+  Kokkos::deep_copy(Exec(), p_old_, p_);
+}
+
 void FluidSolver::set_body_force(const Components<double>& force, std::function<void(double)> update) {
   body_force_ = force;
   update_force_ = std::move(update);
@@ -183,31 +189,41 @@ void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
     interpolate_flux<true>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
   else
     interpolate_flux<false>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
-  const double speed = std::max(statistics_.reference_speed, 1e-30);
-  if (!bodies || bodies->bodies == 0) {
-    statistics_.flux_correction = std::max(statistics_.flux_correction, boundaries_.balance(flux_, 0) / speed);
-    return;
-  }
-  if (static_cast<int>(body_sums_.extent(0)) != bodies->bodies) {
-    body_sums_ = Table<double>("corpuscle::immersed::body_sums", bodies->bodies, 2);
+  boundaries_.close_moving_walls(flux_);
+  const double growth = bodies && bodies->bodies > 0 ? give_bodies_their_flux(*bodies) : 0;
+  if (boundaries_.has_inlet() && !boundaries_.has_outflow()) note_correction(boundaries_.balance(flux_, growth));
+}
+
+/// @param speed  change of the mean velocity through some faces, um/us
+void FluidSolver::note_correction(double speed) {
+  const double reference = std::max(statistics_.reference_speed, 1e-30);
+  statistics_.flux_correction = std::max(statistics_.flux_correction, speed / reference);
+}
+
+/// The fluxes around each body add up to its growth. Where nothing can leave the block, what all bodies together grow by
+/// (the round-off of rigid motions and of membranes that keep their volume) is shared out over their faces.
+/// @returns the growth of all bodies, um3/us
+double FluidSolver::give_bodies_their_flux(const EmbeddedBodies& bodies) {
+  if (static_cast<int>(body_sums_.extent(0)) != bodies.bodies) {
+    body_sums_ = Table<double>("corpuscle::immersed::body_sums", bodies.bodies, 2);
     body_sums_host_ = HostCopy(body_sums_);
   }
-  if (!growth_host_.is_of(bodies->growth)) growth_host_ = HostCopy(bodies->growth);
-  body_flux_sums(grid_->views(), *bodies, flux_, body_sums_);
-  const auto& host = body_sums_host_.read();
-  grid_->comm().sum(host.data(), 2 * bodies->bodies);
-  body_sums_host_.write();
-  correct_body_flux(grid_->views(), *bodies, body_sums_, flux_);
+  if (!growth_host_.is_of(bodies.growth)) growth_host_ = HostCopy(bodies.growth);
+  body_flux_sums(grid_->views(), bodies, flux_, body_sums_);
+  const auto& sums = body_sums_host_.read();
+  grid_->comm().sum(sums.data(), 2 * bodies.bodies);
   const auto& growth = growth_host_.read();
-  double total_growth = 0;
-  for (int b = 0; b < bodies->bodies; ++b) {
-    total_growth += growth(b);
-    if (host(b, 1) > 0)
-      statistics_.flux_correction =
-          std::max(statistics_.flux_correction, std::abs(growth(b) - host(b, 0)) / (host(b, 1) * speed));
+  double total = 0, area = 0;
+  for (int b = 0; b < bodies.bodies; ++b) total += growth(b), area += sums(b, 1);
+  const bool closed = !boundaries_.has_outflow() && !boundaries_.has_inlet();
+  const double surplus = closed && area > 0 ? total / area : 0;
+  for (int b = 0; b < bodies.bodies; ++b) {
+    sums(b, 0) += surplus * sums(b, 1);
+    if (sums(b, 1) > 0) note_correction(std::abs(growth(b) - sums(b, 0)) / sums(b, 1));
   }
-  statistics_.flux_correction =
-      std::max(statistics_.flux_correction, boundaries_.balance(flux_, total_growth) / speed);
+  body_sums_host_.write();
+  correct_body_flux(grid_->views(), bodies, body_sums_, flux_);
+  return total;
 }
 
 /// Fluid nodes, of all ranks, from which no path leads to where the pressure is given: their equation has no solution.

@@ -46,6 +46,8 @@ class FluidSolver {
 
   /// Node kinds after bodies have moved; the halo layers must be up to date. Without bodies this is never called.
   void set_kinds(const Array<NodeKind>& kind);
+  /// Change the pressure that the step starts from at some owned nodes. On all ranks.
+  void mend_pressure(const std::function<void(const Array<double>&)>& change);
   /// For set-up and failures: floods the grid, with temporary arrays.
   /// @throws ComputationError  when bodies cut fluid nodes off from where the pressure is given
   void check_connected();
@@ -117,6 +119,8 @@ class FluidSolver {
   void apply_potential();
   KrylovResult solve_pressure(double target);
   void make_flux(const EmbeddedBodies* bodies);
+  double give_bodies_their_flux(const EmbeddedBodies& bodies);
+  void note_correction(double speed);
   class Correction;
   template <class Use>
   void with_operator(const Use& use) const;

@@ -109,6 +109,7 @@ Grid::Grid(const Comm& comm, const NodeSource& source, const std::array<bool, 3>
 
 void Grid::fill_nodes(const NodeSource& source) {
   const IndexSpace& index = views_.index;
+  corner_ = source.node(0, 0, 0);
   for (int d = 0; d < 3; ++d) {
     if (!index.periodic[d]) continue;
     std::array<int, 3> low{}, high{};

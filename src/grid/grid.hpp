@@ -25,6 +25,8 @@ class Grid {
   const std::vector<double>& owned_nodes() const { return owned_nodes_; }
   /// Translation from one side of a periodic direction to the other, um.
   const Triple& period(int d) const { return period_[d]; }
+  /// The node where all three directions begin, um.
+  const Triple& corner() const { return corner_; }
   double total_volume() const { return total_volume_; }
   double mean_spacing() const { return mean_spacing_; }
   double smallest_spacing() const { return smallest_spacing_; }
@@ -51,6 +53,7 @@ class Grid {
   GridViews views_;
   Halo halo_;
   std::array<Triple, 3> period_{};
+  Triple corner_{};
   std::vector<double> owned_nodes_;
   double total_volume_ = 0, mean_spacing_ = 0, smallest_spacing_ = 0, skewness_ = 0, skewed_share_ = 0;
 };

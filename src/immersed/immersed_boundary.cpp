@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "immersed/uncovered.hpp"
 
 namespace corpuscle {
 
@@ -23,7 +24,7 @@ auto to_host(const View& view) {
 }
 
 /// All shifts by -1, 0 or +1 period; the identity first, so that it wins ties.
-Images make_images(const IndexSpace& index, const std::array<Vec3, 3>& period) {
+Images make_images(const IndexSpace& index, const Vec3 (&period)[3]) {
   Images images;
   images.count = 0;
   for (int k = 0; k < 27; ++k) {
@@ -68,7 +69,7 @@ void find_bounds(const Lattice& lattice, LocateOptions& options) {
 ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surface, const ImmersedOptions& options)
     : grid_(grid), surface_(surface), options_(options), lattice_(make_lattice(grid)) {
   for (int d = 0; d < 3; ++d) {
-    if (grid.index.periodic[d] && norm(options.period[d]) == 0) {
+    if (grid.index.periodic[d] && norm(options.frame.period[d]) == 0) {
       throw InputError(fmt::format("immersed boundary: index direction {} is periodic but its period is zero", d));
     }
   }
@@ -76,7 +77,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
     throw InputError(fmt::format("traction fit: radius {} spacings; allowed up to 2.5, which three halo layers hold",
                                  options.traction.radius));
   }
-  images_ = make_images(grid.index, options.period);
+  images_ = make_images(grid.index, options.frame.period);
   find_bounds(lattice_, locate_);
   std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
   locate_.band_links = options.band_links;
@@ -103,6 +104,8 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   traction_counts_ = make<Array<int>>("traction_counts", static_cast<int>(traction_counts));
   faces_.start = make<Array<int>>("face_start", surface.bodies + 1);
   stress_ = make_surface_stress("corpuscle::immersed::stress_vertex", surface.vertices);
+  if (periodic()) laps_ = Table<int>("corpuscle::immersed::laps", surface.bodies, 3);
+  Kokkos::deep_copy(places_.status, Located::failed);
   if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
   box_host_ = HostCopy(places_.box);
   found_host_ = HostCopy(places_.found);
@@ -139,6 +142,8 @@ void ImmersedBoundary::allocate_faces(int faces) {
   faces_.cell = make<Array<int>>("face_cell", faces);
   faces_.direction = make<Array<std::int8_t>>("face_direction", faces);
   faces_.sign = make<Array<std::int8_t>>("face_sign", faces);
+  faces_.counted = make<Array<std::int8_t>>("face_counted", faces);
+  faces_.image = make<Array<std::int8_t>>("face_image", faces);
   faces_.body = make<Array<int>>("face_body", faces);
 }
 
@@ -172,6 +177,7 @@ void ImmersedBoundary::classify() {
   mark_cut_links(lattice_, surface_, images_, places_, band_);
   measure_band(lattice_, box, surface_, images_, normals_, band_);
   last_box_ = present;
+  counted_box_ = box;
   classify_nodes(box);
 
   if (list_immersed(grid_.index, box, nodes_.kind, velocity_.node) != counts_.immersed ||
@@ -179,9 +185,34 @@ void ImmersedBoundary::classify() {
     allocate_rows(counts_.immersed + counts_.immersed / 2);
     list_immersed(grid_.index, box, nodes_.kind, velocity_.node);
   }
+}
+
+void ImmersedBoundary::wrap(int first, int last, bool from_start) {
+  if (periodic() && last > first)
+    wrap_bodies(surface_, first, last, options_.frame, from_start, images_.count, places_.status, laps_);
+}
+
+std::vector<double> ImmersedBoundary::laps_state() const {
+  const auto host = to_host(laps_);
+  return {host.data(), host.data() + host.size()};
+}
+
+void ImmersedBoundary::set_laps_state(const std::vector<double>& laps) {
+  auto host = to_host(laps_);
+  for (std::size_t e = 0; e < laps.size(); ++e) host.data()[e] = static_cast<int>(laps[e]);
+  Kokkos::deep_copy(laps_, host);
+}
+
+void ImmersedBoundary::fill_uncovered(const Array<double>& p) const {
+  corpuscle::fill_uncovered(lattice_, counted_box_, nodes_.kind, previous_kind_, p);
+}
+
+double ImmersedBoundary::smallest_spacing() const { return smallest_spacing_at(lattice_, surface_.vertices, places_); }
+
+void ImmersedBoundary::find_faces() {
   counts_.faces = count_faces(grid_.index, places_.box, surface_.bodies, nodes_, faces_);
   if (counts_.faces > static_cast<int>(faces_.cell.extent(0))) allocate_faces(counts_.faces + counts_.faces / 2);
-  list_faces(grid_.index, places_.box, surface_.bodies, nodes_, faces_);
+  list_faces(grid_.index, places_.box, surface_.bodies, surface_.triangles, nodes_, band_.key, faces_);
 }
 
 void ImmersedBoundary::classify_nodes(const NodeBox& box) {

@@ -10,12 +10,13 @@
 #include "immersed/faces.hpp"
 #include "immersed/locate.hpp"
 #include "immersed/traction.hpp"
+#include "immersed/wrap.hpp"
 
 namespace corpuscle {
 
 struct ImmersedOptions {
   std::array<bool, 6> wall{};    // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
-  std::array<Vec3, 3> period{};  // shift by one period along each periodic direction, um
+  PeriodicFrame frame;           // of the periodic directions
   double band_links = 1.1;       // half-width of the search band in link lengths
   Reconstruction reconstruction = Reconstruction::quadratic;
   PressureExtension pressure_extension = PressureExtension::least_squares;
@@ -53,11 +54,25 @@ class ImmersedBoundary {
   /// @param surface  shared views: later changes of positions and velocities are seen. Topology is fixed.
   ImmersedBoundary(const GridViews& grid, const SurfaceSet& surface, const ImmersedOptions& options);
 
-  /// Search, classify, list immersed nodes and faces at the surfaces' present position. Halo nodes are classified too;
-  /// of these the outermost layer may miss links beyond it.
+  /// Move bodies first <= b < last as a whole into the periodic domain; see wrap_bodies(). Nothing without one.
+  void wrap(int first, int last, bool from_start);
+  bool periodic() const { return images_.count > 1; }
+  /// [body, 3] periods by which the bodies have been moved back; empty without a periodic direction.
+  const Table<int>& laps() const { return laps_; }
+  /// The same as numbers [3 * bodies], for restarts.
+  std::vector<double> laps_state() const;
+  void set_laps_state(const std::vector<double>& laps);
+  /// Search, classify and list immersed nodes at the surfaces' present position. Halo nodes are classified too; of these
+  /// the outermost layer may miss links beyond it.
   void classify();
+  /// List the faces around each body. @pre classify(), and halos of nodes() exchanged
+  void find_faces();
   /// Rows for velocity and pressure at the listed nodes. @pre classify()
   void build_stencils();
+  /// Give fluid nodes that were inside a body at the last classification a pressure. @pre p's halos filled
+  void fill_uncovered(const Array<double>& p) const;
+  /// Smallest grid spacing, over directions, at the nodes nearest to the vertices that this rank owns, um.
+  double smallest_spacing() const;
   /// Interpolate the surfaces' present velocities to the rows' surface points. @pre build_stencils()
   void update_surface_velocity();
 
@@ -115,6 +130,7 @@ class ImmersedBoundary {
   Lattice lattice_;
   Images images_;
   Vec3 first_node_;
+  Table<int> laps_;
   LocateOptions locate_;
   PlaceViews places_;
   PseudoNormals normals_;
@@ -131,7 +147,7 @@ class ImmersedBoundary {
   Components<double> u_surface_;
   FaceViews faces_;
   SurfaceStress stress_;
-  NodeBox last_box_;
+  NodeBox last_box_, counted_box_;
   ImmersedCounts counts_;
 };
 

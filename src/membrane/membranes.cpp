@@ -163,6 +163,7 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
     take_substeps(1, dt_us / count, stress, beta, v_star);
     cell = trouble();
   }
+  if (cell < 0) return count;
   explain(cell, dt_us);
 }
 

@@ -198,8 +198,8 @@ TEST_CASE("a skewed grid keeps a uniform flow", "[fluid][ranks]") {
   const auto convection = GENERATE(Convection::none, Convection::extrapolated, Convection::implicit);
   FluidSettings settings;
   settings.convection = convection;
-  auto all = sides({Type::moving_wall, Type::moving_wall, Type::moving_wall, Type::moving_wall, Type::moving_wall,
-                    Type::moving_wall});
+  auto all = sides({Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet,
+                    Type::velocity_inlet, Type::velocity_inlet});
   for (auto& side : all) side.velocity = Triple{0.3, -0.5, 0.8};
   Grid grid(Comm(), warped_box({8, 7, 9}), {false, false, false});
   REQUIRE_FALSE(grid.orthogonal());

@@ -191,7 +191,7 @@ TEST_CASE("the least gap between two bodies is counted in spacings") {
     spacing[direction] = (2 * radius + gap) / block.global[direction];
     const GridViews grid = make_grid(block, uniform({-2.5, -2.5, -2.5}, spacing));
     ImmersedOptions options;
-    options.period[direction][direction] = 2 * radius + gap;
+    options.frame.period[direction][direction] = 2 * radius + gap;
     ImmersedBoundary ib(grid, make_surface_set({sphere(4, radius, centre)}), options);
     ib.classify();
     CHECK(ib.counts().body_spacings == Approx(gap / spacing[direction]).margin(0.3));  // the same, spacing 0.07 to 0.13 um
@@ -282,15 +282,32 @@ TEST_CASE("a body across a periodic boundary is seen from both ends") {
   block.periodic = {false, false, true};
   const GridViews grid = make_grid(block, uniform({-3, -3, 0}, {h, h, h}));
   ImmersedOptions options;
-  options.period[2] = {0, 0, period};
+  options.frame.period[2] = {0, 0, period};
   const SurfaceSet across = make_surface_set({sphere(3, 1.5, {0.02, 0.03, 0.1})});
   const SurfaceSet centred = make_surface_set({sphere(3, 1.5, {0.02, 0.03, 0.1 + 10 * h})});
   ImmersedBoundary ib(grid, across, options), reference(grid, centred, options);
   ib.classify();
   reference.classify();
+  ib.find_faces();
+  reference.find_faces();
   CHECK(ib.counts().owned_vertices == across.vertices);
   CHECK(ib.counts().immersed == reference.counts().immersed);
-  CHECK(ib.counts().faces == reference.counts().faces);
+  // Faces at the periodic side are stored at both its ends, and listed twice, so that both copies get the same flux.
+  const auto counted = on_host(ib.faces().counted), direction = on_host(ib.faces().direction);
+  const auto cell = on_host(ib.faces().cell);
+  int all = 0;
+  std::map<int, int> at_seam;  // place in the plane -> copies
+  for (int n = 0; n < ib.counts().faces; ++n) {
+    all += counted(n);
+    int i[3];
+    grid.index.unpack(cell(n), i[0], i[1], i[2]);
+    if (direction(n) == 2 && (i[2] == 0 || i[2] == cells)) ++at_seam[i[0] + 100 * i[1]];
+  }
+  CHECK(all == reference.counts().faces);
+  CHECK(ib.counts().faces == all + static_cast<int>(at_seam.size()));
+  REQUIRE(!at_seam.empty());
+  for (const auto& [place, copies] : at_seam) CHECK(copies == 2);
+  CHECK(ib.smallest_spacing() == Approx(h).epsilon(1e-12));
   const auto kind = on_host(ib.nodes().kind), expected = on_host(reference.nodes().kind);
   for (int k = 0; k < cells; ++k) {
     for (int j = 0; j < 20; ++j) {
@@ -325,6 +342,7 @@ TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body
   const SurfaceSet surface = make_surface_set({biconcave(3, {0.02, 0.01, -1.5}, 0.2), sphere(2, 1.2, {0, 0, 3.1})});
   ImmersedBoundary ib(grid, surface, plain());
   ib.classify();
+  ib.find_faces();
   const auto kind = on_host(ib.nodes().kind);
   const auto body = on_host(ib.nodes().body);
   const FaceViews& f = ib.faces();

@@ -136,7 +136,7 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
   std::vector<BoundarySettings> sides(6);
   for (int s = 0; s < 6; ++s) {
     sides[s].side = static_cast<BoundarySettings::Side>(s);
-    sides[s].type = BoundarySettings::Type::moving_wall;
+    sides[s].type = BoundarySettings::Type::velocity_inlet;
     sides[s].velocity = Triple{1, 0, 0};
   }
   FluidSolver solver(grid, settings, sides);
