@@ -286,12 +286,12 @@ class CellInTube(Problem):
                      "well that many triangles describe the shape.")
 
     def sweeps(self):
-        aitken = [{"scheme": "aitken", "coupling_tolerance": t} for t in ([1e-1, 1e-2, 1e-3] if self.full else [1e-1, 1e-2])]
+        iterated = [{"scheme": "iterated", "coupling_tolerance": t} for t in ([1e-1, 1e-2, 1e-3] if self.full else [1e-1, 1e-2])]
         return {"nodes": ["16x16x26", "21x21x35", "26x26x43", "31x31x51", "41x41x67"] + (["61x61x101"] if self.full else []),
                 "step_us": [8, 4, 2, 1, 0.5] + ([0.25] if self.full else []),
                 "first_step_us": [4, 2, 1, 0.5] + ([0.25] if self.full else []),
                 "vertices": [300, 500, 1000, 2000] if self.full else [300, 500, 1000],
-                "scheme": [{"scheme": "loose"}, {}] + aitken,
+                "scheme": [{"scheme": "loose"}, {}] + iterated,
                 "robin_coefficient": [30, 20, "pi mu / h", 10] if self.full else [20, "pi mu / h", 10],
                 "convection": [False, True] + (["implicit"] if self.full else []),
                 "momentum_tolerance": ([1e-2] if self.full else []) + [1e-3, 1e-4, 1e-5, 1e-6] + ([1e-8] if self.full else []),

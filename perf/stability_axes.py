@@ -128,8 +128,8 @@ def coupling_rows(s, threshold):
                         setup=lambda m: tube(s, cells__0__mass_pg=m, **change), source=ADDED)
         return Series(**(settings | more))
     short = {"time__step_us": 0.1, "time__end_us": 10, "boundary__0__ramp_us": 0}
-    few = {"coupling__scheme": "aitken", "time__end_us": 5}
-    bare = few | {"coupling__robin_in_aitken": False, "time__end_us": 3}
+    few = {"coupling__scheme": "iterated", "time__end_us": 5}
+    bare = few | {"coupling__robin_in_iterated": False, "time__end_us": 3}
     light = dict(limits=added_mass_limits(lambda c: AREA * (0.75 * RHO * c - 0.1 * math.pi * MU / h)),
                  added_mass=lambda mass: implied_added_mass(mass, 0.1, NU, h))
     return [
@@ -141,10 +141,10 @@ def coupling_rows(s, threshold):
         row("mass, loose, dt 1 us", [27, 100, 600, 700, 1000, 7200], {"coupling__scheme": "loose"}, bisect=s.bisect - 2,
             limits=[(AREA * threshold, "program")],
             source=ADDED + "; below it the program refuses, so the true limit can only be shown not to lie above"),
-        row("mass, aitken, dt 1 us", masses, few, source=ADDED + ": holds at any mass"),
-        row("mass, aitken, dt 0.1 us", masses, short | {"coupling__scheme": "aitken", "time__end_us": 1}, **light,
+        row("mass, iterated, dt 1 us", masses, few, source=ADDED + ": holds at any mass"),
+        row("mass, iterated, dt 0.1 us", masses, short | {"coupling__scheme": "iterated", "time__end_us": 1}, **light,
             bisect=s.bisect - 1, source="abs(beta - Lambda) < M / (A dt) + beta, which is the same inequality"),
-        row("mass, aitken without Robin, dt 1 us", masses[2:], bare, bisect=s.bisect - 2,
+        row("mass, iterated without Robin, dt 1 us", masses[2:], bare, bisect=s.bisect - 2,
             source="Aitken relaxes: factor about 1 - omega (1 + Lambda A dt / M); no fixed limit, but 200 iterations"),
     ]
 

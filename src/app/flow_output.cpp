@@ -150,7 +150,7 @@ void FlowOutput::write_history() {
   auto* bodies = simulation_.rigid_bodies();
   if (!bodies) return;
   auto& immersed = *simulation_.immersed();
-  if (!simulation_.membranes() && simulation_.steps() > 0) immersed.tractions();
+  simulation_.coupling()->tractions_for_output();
   std::vector<Triple> centre(simulation_.surfaces()->bodies);
   for (int b = 0; b < bodies->count(); ++b) centre[simulation_.cells() + b] = bodies->centre(b);
   const auto loads = immersed.loads(centre);
@@ -200,7 +200,7 @@ void FlowOutput::write_fields() {
 void FlowOutput::write_cells() {
   if (!simulation_.surfaces()) return;
   if (simulation_.steps() > 0) {
-    if (!simulation_.membranes()) simulation_.immersed()->tractions();
+    simulation_.coupling()->tractions_for_output();
     const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
     slip_ = std::max(slip_, simulation_.immersed()->slip()[1] / speed);
   }
@@ -208,7 +208,7 @@ void FlowOutput::write_cells() {
   if (!cells_) return;
   const auto& set = *simulation_.surfaces();
   const auto x = vertex_values(set.vertices, set.x), v = vertex_values(set.vertices, set.v);
-  const auto traction = vertex_values(set.vertices, simulation_.immersed()->last_tractions());
+  const auto traction = vertex_values(set.vertices, simulation_.coupling()->tractions_for_output());
   cells_->write(simulation_.time(), simulation_.steps(), x.data(),
                 {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}});
 #endif
@@ -285,11 +285,7 @@ void FlowOutput::fill(Report& report) {
     errors["area_drift"] = area_drift_;
     errors["coupling_residual"] = residual_.samples ? residual_.sum / residual_.samples : 0.0;
     errors["coupling_residual_max"] = residual_.largest;
-    const auto& s = simulation_.stability();
-    report.extra["stability"] = {{"mass_term_pg_per_um2_per_us", s.mass_term},
-                                 {"beta_pg_per_um2_per_us", s.beta},
-                                 {"threshold_pg_per_um2_per_us", s.threshold()},
-                                 {"margin", s.margin()}};
+    report.extra["stability"] = simulation_.coupling()->report(simulation_.last_step_us());
   }
   fill_energy(report);
   fill_quantities(report);

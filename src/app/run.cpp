@@ -84,7 +84,7 @@ Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   FlowSimulation simulation(comm, scene, timers);
   print_schedule(simulation.schedule());
   if (simulation.membranes()) {
-    const auto& s = simulation.stability();
+    const auto s = *simulation.coupling()->stability(simulation.next_step_us());
     info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
          s.mass_term, s.beta, s.threshold(), s.margin());
     const int substeps = simulation.membranes()->substeps(simulation.next_step_us(), s.beta);
@@ -282,7 +282,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
        simulation.surfaces() ? simulation.surfaces()->vertices : 0);
   print_schedule(simulation.schedule());
   if (simulation.membranes()) {
-    const auto& s = simulation.stability();
+    const auto s = *simulation.coupling()->stability(simulation.next_step_us());
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
          s.margin(), s.mass_term, s.beta, s.threshold());
     auto& membranes = *simulation.membranes();

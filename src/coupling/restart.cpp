@@ -87,10 +87,14 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
       file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d),
                box_values(index, faces, state.flux_old[d]).data());
   }
-  const double numbers[3] = {state.reference_speed, progress.relaxation, progress.last_step};
-  file.add("numbers", {3}, numbers);
+  const double numbers[2] = {state.reference_speed, progress.last_step};
+  file.add("numbers", {2}, numbers);
   const std::int64_t levels = state.history_levels;
   file.add("history_levels", {1}, &levels);
+  if (simulation.coupling()) {
+    const auto coupling = simulation.coupling()->state();
+    if (!coupling.empty()) file.add("coupling", {coupling.size()}, coupling.data());
+  }
   if (simulation.membranes()) {
     const auto membranes = simulation.membranes()->state();
     file.add("membranes", {membranes.size()}, membranes.data());
@@ -138,10 +142,10 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
       set_box_values(index, faces, flux, state.flux_old[d]);
     }
   }
-  double numbers[3];
-  file.read("numbers", {3}, numbers);
+  double numbers[2];
+  file.read("numbers", {2}, numbers);
   try {
-    simulation.resume({file.header().time_us, numbers[1], numbers[2], file.header().step});
+    simulation.resume({file.header().time_us, numbers[1], file.header().step});
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", path, error.what()));
   }
@@ -149,8 +153,16 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
   file.read("history_levels", {1}, &levels);
   state.reference_speed = numbers[0];
   state.time_us = file.header().time_us;
-  state.step_us = numbers[2];
+  state.step_us = numbers[1];
   state.history_levels = static_cast<int>(levels);
+  // Another scheme than that of the checkpoint starts without a history of its own.
+  if (simulation.coupling() && file.has("coupling")) {
+    auto coupling = simulation.coupling()->state();
+    if (!coupling.empty() && file.shape("coupling") == Shape{coupling.size()}) {
+      file.read("coupling", {coupling.size()}, coupling.data());
+      simulation.coupling()->set_state(coupling);
+    }
+  }
   if (simulation.membranes()) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());

@@ -102,14 +102,21 @@ BodySettings read_body(Section& s) {
 
 CouplingSettings read_coupling(Section& s) {
   using Scheme = CouplingSettings::Scheme;
+  using Acceleration = CouplingSettings::Acceleration;
   CouplingSettings c;
   c.scheme = s.choice<Scheme>(
-      "scheme", {{"robin", Scheme::robin}, {"aitken", Scheme::aitken}, {"loose", Scheme::loose}}, c.scheme);
+      "scheme", {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated}},
+      c.scheme);
   c.tolerance = s.number("tolerance", between(1e-12, 0.5), c.tolerance);
   c.max_iterations = s.integer("max_iterations", 1, 10000, c.max_iterations);
   const std::string robin = "robin_coefficient_pg_per_um2_per_us";
   if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative());
-  c.robin_in_aitken = s.flag("robin_in_aitken", c.robin_in_aitken);
+  // Up to version 0.1 the scheme was called "aitken", whichever acceleration it used.
+  const std::string in_iterated = s.node("robin_in_aitken") ? "robin_in_aitken" : "robin_in_iterated";
+  c.robin_in_iterated = s.flag(in_iterated, c.robin_in_iterated);
+  const bool robin_term = c.robin_in_iterated && c.robin_coefficient != 0;
+  c.acceleration = s.choice<Acceleration>("acceleration", {{"anderson", Acceleration::anderson}, {"aitken", Acceleration::aitken}},
+                                          robin_term ? Acceleration::anderson : Acceleration::aitken);
   s.finish();
   return c;
 }

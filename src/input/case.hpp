@@ -117,13 +117,15 @@ struct BodySettings {
 
 /// [coupling]
 struct CouplingSettings {
-  enum class Scheme { robin, aitken, loose };
+  enum class Scheme { robin, iterated, loose };
+  enum class Acceleration { anderson, aitken };
 
   Scheme scheme = Scheme::robin;
-  double tolerance = 1e-3;              // aitken: residual over the step's displacement
-  int max_iterations = 200;             // aitken
-  double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see FlowSimulation::stability_of)
-  bool robin_in_aitken = true;
+  double tolerance = 1e-3;              // iterated: residual over the step's displacement
+  int max_iterations = 200;             // iterated
+  std::optional<Acceleration> acceleration;  // iterated; by default Anderson's with a Robin term, Aitken's without
+  double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see MembraneCoupling::stability)
+  bool robin_in_iterated = true;
 
   bool operator==(const CouplingSettings&) const = default;
 };

@@ -8,7 +8,7 @@ using Catch::Contains;
 
 TEST_CASE("nothing converges in too few iterations, and the message says so") {
   const auto folder = fresh_folder("iterations");
-  fail(folder, coarse_tube("out", {"time.end_us=4", "coupling.scheme=aitken", "coupling.max_iterations=1"}), 3,
+  fail(folder, coarse_tube("out", {"time.end_us=4", "coupling.scheme=iterated", "coupling.max_iterations=1"}), 3,
        {"broke down", "at 1 us (step 1)", "coupling", "interface velocity", "coupling.max_iterations",
         "Last good checkpoint: none yet"});
   fail(folder, coarse_tube("out", {"time.end_us=4", "fluid.max_iterations=1"}), 3,

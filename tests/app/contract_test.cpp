@@ -199,12 +199,12 @@ TEST_CASE("every key that scripts rely on is accepted, and used") {
                {"time.step_us=0.5", "time.end_us=1", "grid.nodes=[17,17,25]", "fluid.density_pg_per_um3=1.025",
                 "fluid.kinematic_viscosity_um2_per_us=1.2", "fluid.convection=false", "cells.0.vertices=300",
                 "cells.0.mass_pg=7200", "cells.0.reference=uniform", "cells.0.interior=empty",
-                "cells.0.shear_modulus_uN_per_m=8.3", "coupling.scheme=aitken", "coupling.tolerance=0.01",
+                "cells.0.shear_modulus_uN_per_m=8.3", "coupling.scheme=iterated", "coupling.tolerance=0.01",
                 "output.every_us=0.5", "output.fields=[\"pressure\"]"},
                {"step_us = 0.5", "end_us = 1", "nodes = [17, 17, 25]", "density_pg_per_um3 = 1.025",
                 "kinematic_viscosity_um2_per_us = 1.2", "convection = false", "vertices = 300", "mass_pg = 7200",
                 "reference = \"uniform\"", "interior = \"empty\"", "shear_modulus_uN_per_m = 8.3",
-                "scheme = \"aitken\"", "tolerance = 0.01", "every_us = 0.5", "fields = [\"pressure\"]"});
+                "scheme = \"iterated\"", "tolerance = 0.01", "every_us = 0.5", "fields = [\"pressure\"]"});
   require_used(
       {"run", sphere_case(folder), "--out", "out"},
       {"grid.nodes=[17,17,25]", "time.end_us=1", "bodies.0.shape=sphere", "bodies.0.radius_um=1.75",

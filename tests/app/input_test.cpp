@@ -161,7 +161,7 @@ TEST_CASE("results that cannot be written") {
 }
 
 TEST_CASE("a coupling that cannot be stable is refused with the reason") {
-  refuse("coupling.scheme=loose", {"coupling", "M / (A dt)", "would diverge", "robin", "cells.0.mass_pg", "aitken"});
+  refuse("coupling.scheme=loose", {"coupling", "M / (A dt)", "would diverge", "robin", "cells.0.mass_pg", "iterated"});
 }
 
 TEST_CASE("more ranks than the case can use") {

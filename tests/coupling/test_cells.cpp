@@ -75,7 +75,7 @@ TEST_CASE("a cell takes the same shape at both ends of a long tube, where the le
 }
 
 TEST_CASE("the staggered scheme follows the iterated one", "[coupling]") {
-  auto tight = scenes::tube_with_cell(17, 25, 100, Scheme::aitken, 12);
+  auto tight = scenes::tube_with_cell(17, 25, 100, Scheme::iterated, 12);
   const auto reference = run(tight);
   const auto robin = run(scenes::tube_with_cell(17, 25, 100, Scheme::robin, 12));
   const double distance = rms_distance(robin.mesh, reference.mesh);
@@ -84,9 +84,9 @@ TEST_CASE("the staggered scheme follows the iterated one", "[coupling]") {
 }
 
 TEST_CASE("the fixed point of the iterated coupling does not depend on the Robin term", "[coupling]") {
-  auto scene = scenes::tube_with_cell(17, 25, 7200, Scheme::aitken, 8);
+  auto scene = scenes::tube_with_cell(17, 25, 7200, Scheme::iterated, 8);
   const auto with_robin = run(scene);
-  scene.coupling->robin_in_aitken = false;
+  scene.coupling->robin_in_iterated = false;
   const double path = with_robin.cell.centroid_um[2];
   // Both stop when the velocity changes by 1e-3 of itself, which leaves up to 1 / (1 - 0.9) times as much to go.
   CHECK(rms_distance(run(scene).mesh, with_robin.mesh) < 0.02 * std::abs(path));
@@ -99,7 +99,7 @@ TEST_CASE("a coupling that cannot be stable is refused with the reason", "[coupl
                                                                Catch::Contains("cells.0.mass_pg"));
   CHECK_THROWS_AS(FlowSimulation(Comm(), light, timers), InputError);
   const auto heavy = scenes::tube_with_cell(21, 31, 7200, Scheme::loose, 10);
-  CHECK(FlowSimulation(Comm(), heavy, timers).stability().margin() > 1);
+  CHECK(FlowSimulation(Comm(), heavy, timers).coupling()->stability(1)->margin() > 1);
 }
 
 TEST_CASE("a cell through the wall or outside the grid is refused", "[coupling]") {

@@ -139,7 +139,7 @@ TEST_CASE("the keys that scripts rely on can all be set") {
   REQUIRE(scene.cells[0].mass_pg == 7200);
   REQUIRE(scene.cells[0].reference == CellSettings::Reference::spontaneous_angle);
   REQUIRE(scene.cells[0].shear_modulus_uN_per_m == 5);
-  REQUIRE(scene.coupling->scheme == CouplingSettings::Scheme::aitken);
+  REQUIRE(scene.coupling->scheme == CouplingSettings::Scheme::iterated);
   REQUIRE(scene.coupling->tolerance == 1e-4);
   REQUIRE(scene.output.every_us == 5);
   REQUIRE_FALSE(scene.output.fields);

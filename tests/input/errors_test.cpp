@@ -221,7 +221,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell("mesh = \"missing.off\""), {":12: cells.0.mesh", "there is no file", "missing.off"});
   const auto mesh = (cases / "mills2004.csv").string();
   require_parts(cell("mesh = \"" + mesh + "\""), {":12: cells.0.mesh", "OFF or STL"});
-  require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"aitken\", \"loose\""});
+  require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"iterated\", \"loose\""});
   require_parts(cell("[coupling]\ntolerance = 1"), {":13: coupling.tolerance = 1", "from 1e-12 to 0.5"});
   require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
 

@@ -1,0 +1,65 @@
+// How bodies and the flow around them advance together: one interface for every way there is.
+#pragma once
+
+#include "coupling/immersed_flow.hpp"
+#include "coupling/rigid_bodies.hpp"
+#include "coupling/step_schedule.hpp"
+#include "membrane/membranes.hpp"
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace corpuscle {
+
+/// Stability of the coupling, estimated before a step.
+struct StabilityEstimate {
+  double mass_term = 0;   // M / (A dt), pg/um2/us
+  double beta = 0;        // Robin coefficient in use, pg/um2/us
+  double viscous = 0, inertial = 0;  // half the largest reactions of the fluid
+  double threshold() const { return viscous > inertial ? viscous : inertial; }
+  double margin() const { return (mass_term + beta) / threshold(); }
+};
+
+struct StepStatistics {
+  int coupling_iterations = 0, substeps = 0;
+  double coupling_residual = 0;  // change of the interface velocity that one more iteration would make, relative
+};
+
+class Coupling {
+ public:
+  virtual ~Coupling() = default;
+
+  /// Search at the bodies' starting positions.
+  /// @throws InputError  where they cannot start: outside the grid, too near to a wall or to each other, overlapping
+  virtual void check_start() = 0;
+  /// Place the bodies for a step from `time_us`, solve the flow, move the membranes. After FluidSolver::begin_step().
+  /// @throws ComputationError  when anything breaks down; the message says what, where and why
+  virtual StepStatistics advance(double time_us, double dt_us) = 0;
+
+  /// Traction of the fluid on the bodies' vertices at the end of the last step, [vertex, 3] kPa, the same on all ranks;
+  /// zero before the first step. Worked out now where the step itself did not need it.
+  virtual const Components<double>& tractions_for_output() = 0;
+  /// For a step of that length; nothing where no membrane is coupled.
+  virtual std::optional<StabilityEstimate> stability(double) const { return std::nullopt; }
+
+  /// What the next step depends on beyond the flow and the bodies' positions and velocities, for restarts.
+  virtual std::vector<double> state() const { return {}; }
+  virtual void set_state(const std::vector<double>&) {}
+  /// Entries for the report's "stability".
+  virtual std::map<std::string, double> report(double) const { return {}; }
+
+  virtual const SurfaceSet& surfaces() const = 0;
+  /// Null where there are none.
+  virtual Membranes* membranes() { return nullptr; }
+  virtual RigidBodies* rigid_bodies() { return nullptr; }
+  /// The search and the flow at surfaces that cut the grid; null where none does.
+  virtual ImmersedFlow* immersed() { return nullptr; }
+};
+
+/// The coupling that a case with cells or bodies asks for.
+/// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them
+std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers);
+
+}  // namespace corpuscle

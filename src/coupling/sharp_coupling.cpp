@@ -1,0 +1,55 @@
+#include "coupling/sharp_coupling.hpp"
+
+#include "core/error.hpp"
+
+namespace corpuscle {
+
+std::vector<TriangleMesh> body_meshes(const Case& scene, const Grid& grid) {
+  std::vector<TriangleMesh> meshes;
+  for (const auto& body : scene.bodies) meshes.push_back(make_body_mesh(body, grid.mean_spacing()));
+  return meshes;
+}
+
+SharpCoupling::SharpCoupling(const Case& scene, FluidSolver& fluid, Timers& timers, std::unique_ptr<Membranes> membranes)
+    : scene_(scene), fluid_(fluid), timers_(timers), membranes_(std::move(membranes)) {
+  surfaces_ = std::make_unique<SurfaceSet>(membranes_ ? membranes_->surfaces()
+                                                      : make_surface_set(body_meshes(scene, fluid.grid())));
+  if (!scene.bodies.empty()) {
+    rigid_bodies_ = std::make_unique<RigidBodies>(scene.bodies, *surfaces_, static_cast<int>(scene.cells.size()));
+    rigid_bodies_->move_to(0);
+    fluid_.raise_reference_speed(rigid_bodies_->largest_speed());
+  }
+  immersed_ = std::make_unique<ImmersedFlow>(fluid_, *surfaces_, timers_);
+}
+
+void SharpCoupling::check_start() {
+  immersed_->boundary().wrap(0, surfaces_->bodies, true);
+  try {
+    immersed_->update_geometry(starting_gap);
+  } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
+    throw InputError(error.what());
+  }
+}
+
+void SharpCoupling::move_rigid_bodies(double time) {
+  if (!rigid_bodies_) return;
+  rigid_bodies_->move_to(time);
+  immersed_->boundary().wrap(surfaces_->cells, surfaces_->bodies, true);
+}
+
+StepStatistics SharpCoupling::advance(double time, double dt) {
+  if (rigid_bodies_->moving()) {
+    move_rigid_bodies(time + dt);
+    immersed_->update_geometry(smallest_gap);
+  }
+  immersed_->solve(time + dt);
+  has_flow_ = true;
+  return {};
+}
+
+const Components<double>& SharpCoupling::tractions_for_output() {
+  if (!membranes_ && has_flow_) immersed_->tractions();
+  return immersed_->last_tractions();
+}
+
+}  // namespace corpuscle
