@@ -167,18 +167,26 @@ inline int absorb_isolated(const Lattice& lattice, const NodeBox& box, const Sur
   return isolated;
 }
 
-/// reached = 1 at the fluid nodes of the box's faces, 0 elsewhere in it.
-inline void seed_faces(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
-                       const Array<std::int8_t>& reached) {
+/// Which faces of a node box end a rank's view of the surfaces: [direction][low, high]. Beyond the others lie nodes of
+/// another rank, or of the other end of a periodic direction, or the grid's boundary.
+struct OpenFaces {
+  bool open[3][2] = {{true, true}, {true, true}, {true, true}};
+};
+
+/// reached = 1 at the fluid nodes beyond the band or on an open face, 0 elsewhere in the box.
+inline void seed_open_fluid(const IndexSpace& index, const NodeBox& box, const OpenFaces& faces, const BandViews& band,
+                            const NodeViews& nodes, const Array<std::int8_t>& reached) {
   const auto kind = nodes.kind;
+  const auto key = band.key;
   Kokkos::parallel_for(
-      "corpuscle::immersed::seed_faces", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
+      "corpuscle::immersed::seed_open_fluid", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
         int i[3];
         box.unpack(e, i);
-        bool face = false;
-        for (int d = 0; d < 3; ++d) face = face || i[d] == box.lower[d] || i[d] == box.upper[d];
         const int c = index.cell(i[0], i[1], i[2]);
-        reached(c) = face && kind(c) == NodeKind::fluid ? 1 : 0;
+        bool open = key(c) == no_key;
+        for (int d = 0; d < 3; ++d)
+          open = open || (i[d] == box.lower[d] && faces.open[d][0]) || (i[d] == box.upper[d] && faces.open[d][1]);
+        reached(c) = open && kind(c) == NodeKind::fluid ? 1 : 0;
       });
 }
 
@@ -217,22 +225,44 @@ inline int reach_along(const IndexSpace& index, const NodeBox& box, int directio
   return added;
 }
 
-/// Fluid that a surface's folds close in, on the grid, has no pressure equation that could be solved: band nodes that no
-/// grid path joins to the faces of the box become immersed. @returns how many of them are owned.
-inline int absorb_pockets(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
-                          const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
-  seed_faces(index, box, nodes, reached);
-  int added = 1;
-  while (added > 0) {
+/// Carry `reached` as far as it goes within the box. @returns how many nodes were new.
+inline int reach_all(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
+                     const Array<std::int8_t>& reached) {
+  int total = 0;
+  for (int added = 1; added > 0; total += added) {
     added = 0;
     for (int d = 0; d < 3; ++d) added += reach_along(index, box, d, nodes, reached);
   }
+  return total;
+}
+
+/// Owned fluid nodes of the box that have not been reached.
+inline int count_unreached(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
+                           const Array<std::int8_t>& reached) {
+  const auto kind = nodes.kind;
+  int unreached = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::count_unreached", Policy(0, box.size()),
+      KOKKOS_LAMBDA(int e, int& sum) {
+        int i[3];
+        box.unpack(e, i);
+        const int c = index.cell(i[0], i[1], i[2]);
+        if (index.owns(i[0], i[1], i[2]) && kind(c) == NodeKind::fluid && !reached(c)) sum += 1;
+      },
+      unreached);
+  return unreached;
+}
+
+/// Fluid nodes of the box that have not been reached become immersed: fluid that a surface's folds close in, on the grid,
+/// has no pressure equation that could be solved. @returns how many of them are owned.
+inline int absorb_unreached(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
+                            const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
   const auto triangle_body = surface.triangle_body;
   const auto key = band.key;
   const NodeViews out = nodes;
   int absorbed = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::immersed::absorb_pockets", Policy(0, box.size()),
+      "corpuscle::immersed::absorb_unreached", Policy(0, box.size()),
       KOKKOS_LAMBDA(int e, int& sum) {
         int i[3];
         box.unpack(e, i);

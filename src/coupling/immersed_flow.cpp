@@ -44,6 +44,11 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
   ImmersedOptions options;
   for (int side = 0; side < 6; ++side) options.wall[side] = fluid.boundaries().is_wall(side);
   options.frame = periodic_frame(fluid.grid());
+  if (fluid.shares_nodes()) {
+    Grid* grid = &fluid.grid();
+    options.sum = [grid](long value) { return grid->comm().sum(value); };
+    options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
+  }
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;
   bodies_.images = boundary_->images();

@@ -120,9 +120,7 @@ void FluidSolver::fill_halos(const Components<double>& u) {
 /// Immersed nodes of neighbouring ranks; a rank alone has set its own.
 template <class Velocity>
 void FluidSolver::exchange_immersed(const Velocity& u) {
-  if (grid_->comm().size() > 1 || grid_->index().periodic[0] || grid_->index().periodic[1] ||
-      grid_->index().periodic[2])
-    grid_->halo().exchange(u);
+  if (shares_nodes()) grid_->halo().exchange(u);
 }
 
 template void FluidSolver::exchange_immersed(const Components<double>&);

@@ -53,6 +53,11 @@ class FluidSolver {
   void check_connected();
 
   Grid& grid() { return *grid_; }
+  /// Whether some halo nodes of this block are owned elsewhere: by another rank, or at the other end of a periodic direction.
+  bool shares_nodes() const {
+    const auto& periodic = grid_->index().periodic;
+    return grid_->comm().size() > 1 || periodic[0] || periodic[1] || periodic[2];
+  }
   BoundaryConditions& boundaries() { return boundaries_; }
   const FluidSettings& settings() const { return settings_; }
   const FluidStatistics& statistics() const { return statistics_; }

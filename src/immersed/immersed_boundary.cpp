@@ -225,10 +225,29 @@ void ImmersedBoundary::classify_nodes(const NodeBox& box) {
   for (int d = 0; d < 3; ++d) fill_lines(grid_.index, interior, d, nodes_);
   mark_immersed(lattice_, box, surface_, band_, nodes_);
   counts_.isolated = absorb_isolated(lattice_, box, surface_, images_, normals_, band_, nodes_);
-  counts_.isolated += absorb_pockets(grid_.index, box, surface_, band_, nodes_, reached_);
+  counts_.isolated += absorb_pockets(box);
   count_nodes(lattice_, box, band_, nodes_, previous_kind_, node_counts_);
   read_counts(box);
   if (least_gap_.extent(0) > 0) measure_gaps(box);
+}
+
+/// A pocket may be cut by the planes between ranks or astride a periodic side: only what no rank reaches is one.
+int ImmersedBoundary::absorb_pockets(const NodeBox& box) {
+  OpenFaces faces;
+  for (int d = 0; d < 3; ++d) {
+    faces.open[d][0] = box.lower[d] > lattice_.lower[d];
+    faces.open[d][1] = box.upper[d] < lattice_.upper[d];
+  }
+  const IndexSpace& index = grid_.index;
+  seed_open_fluid(index, box, faces, band_, nodes_, reached_);
+  reach_all(index, box, nodes_, reached_);
+  long unreached = count_unreached(index, box, nodes_, reached_);
+  if (options_.sum) unreached = options_.sum(unreached);
+  for (long added = unreached; added > 0 && options_.exchange;) {
+    options_.exchange(reached_);
+    added = options_.sum(static_cast<long>(reach_all(index, box, nodes_, reached_)));
+  }
+  return unreached > 0 ? absorb_unreached(index, box, surface_, band_, nodes_, reached_) : 0;
 }
 
 void ImmersedBoundary::measure_gaps(const NodeBox& box) {

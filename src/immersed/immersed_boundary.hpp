@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,10 @@ namespace corpuscle {
 struct ImmersedOptions {
   std::array<bool, 6> wall{};    // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
   PeriodicFrame frame;           // of the periodic directions
+  /// Where nodes of others lie beside this block's (other ranks', or its own at the other end of a periodic direction): the
+  /// sum over all ranks, and the exchange of halos.
+  std::function<long(long)> sum;
+  std::function<void(const Array<std::int8_t>&)> exchange;
   double band_links = 1.1;       // half-width of the search band in link lengths
   Reconstruction reconstruction = Reconstruction::quadratic;
   PressureExtension pressure_extension = PressureExtension::least_squares;
@@ -48,7 +53,7 @@ struct NearBodies {
   int body, other = -1;   // -1: no other
 };
 
-/// Owns the search band, the classification and the stencils of one rank's block. Nothing here communicates.
+/// Owns the search band, the classification and the stencils of one rank's block. Communicates only through its options.
 class ImmersedBoundary {
  public:
   /// @param surface  shared views: later changes of positions and velocities are seen. Topology is fixed.
@@ -120,6 +125,7 @@ class ImmersedBoundary {
   void classify_nodes(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
   void read_counts(const NodeBox& box);
+  int absorb_pockets(const NodeBox& box);
   void measure_gaps(const NodeBox& box);
   void allocate_rows(int rows);
   void allocate_faces(int faces);

@@ -149,5 +149,6 @@ template void Halo::run(const Components<float>&);
 template void Halo::run(const Array<float>&);
 template void Halo::run(const Array<int>&);
 template void Halo::run(const Array<NodeKind>&);
+template void Halo::run(const Array<std::int8_t>&);
 
 }  // namespace corpuscle

@@ -24,6 +24,7 @@ class Halo {
   void exchange(const Array<float>& field) { run(field); }
   void exchange(const Array<int>& field) { run(field); }
   void exchange(const Array<NodeKind>& field) { run(field); }
+  void exchange(const Array<std::int8_t>& field) { run(field); }
 
   /// Rank owning the neighbouring block on side (0 low, 1 high) of direction d; -1 beyond a physical boundary.
   int neighbour(int d, int side) const { return neighbour_[d][side]; }
