@@ -6,7 +6,7 @@ Makes, from what is there,
   velocity.png    velocity magnitude on the middle plane at the last stored time
   history.png     histories of every cell or body
   stretching.png  diameters against force, over the experiment
-Needs h5py, numpy and matplotlib; no display.
+Needs h5py, numpy and matplotlib, in this Python or in another one of this machine; no display.
 """
 
 import argparse
@@ -15,12 +15,13 @@ import json
 import pathlib
 import sys
 
-try:
-    import h5py
-    import matplotlib
-    import numpy as np
-except ImportError as error:
-    sys.exit(f"plot.py: {error}. Install h5py, numpy and matplotlib (Debian: python3-h5py python3-matplotlib).")
+import python_with
+
+python_with.need("h5py", "matplotlib", "numpy")
+import h5py
+import matplotlib
+import numpy as np
+
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.cm import ScalarMappable

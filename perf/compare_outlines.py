@@ -9,6 +9,9 @@ largest distance in both directions (the larger), and the shift of the centroid,
 """
 import argparse, pathlib, sys
 
+import study
+
+study.need("h5py", "numpy")
 import h5py
 import numpy as np
 

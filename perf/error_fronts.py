@@ -96,7 +96,7 @@ def cheapest(problem, rows, column, target):
     if not good:
         return f"not reached: at best {min(r[column] for r in rows):.2g} %"
     best = min(good, key=lambda r: r["time_s"])
-    doubt = " (†)" if problem.floors.get(column, 0) > target / 3 else ""
+    doubt = " (†)" if (problem.floors.get(column) or 0) > target / 3 else ""
     return f"{describe(problem, best)}: {best['time_s']:.1f} s{doubt}"
 
 

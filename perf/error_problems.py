@@ -10,6 +10,7 @@ from error_sweeps import ExternalProblem, Problem, compare_alone, note_orders, o
 
 SOLVER = {"momentum_tolerance": 1e-6, "divergence_tolerance": 5e-11}
 CORES = {"threads": 1, "ranks": 1}
+NO_REFERENCE = "The reference did not finish: there are no errors."
 
 
 class ManufacturedFlow(ExternalProblem):
@@ -226,6 +227,7 @@ class Stretching(Problem):
         done = [r for r in rows if r["code"] == 0]
         references = [r["_diameters"] for r in done if r["varied"] == "reference"]
         if not references:
+            self.notes.append(NO_REFERENCE)
             return
         mean = np.mean(references, axis=0)
         rms = lambda a, b: 100 * np.sqrt(((a / b - 1) ** 2).mean())
@@ -235,8 +237,9 @@ class Stretching(Problem):
         spread = np.mean([rms(r, mean) for r in references])
         self.floors["diameters_error_pc"] = spread / np.sqrt(len(references))
         spins = [r["diameters_error_pc"] for r in done if r["varied"] in ("spin_deg", "default")]
-        self.notes.append(f"Turning the mesh of {self.default['vertices']} vertices about its axis gives errors of "
-                          f"{min(spins):.2f} to {max(spins):.2f} %: below that, differences are chance.")
+        if spins:
+            self.notes.append(f"Turning the mesh of {self.default['vertices']} vertices about its axis gives errors of "
+                              f"{min(spins):.2f} to {max(spins):.2f} %: below that, differences are chance.")
         compare_alone(self, done, lambda row, finest: {"alone_pc": rms(row["_diameters"], finest["_diameters"])})
 
 
@@ -263,6 +266,8 @@ class PushedMembrane(ExternalProblem):
     def finish(self, rows):
         done = [r for r in rows if r["code"] == 0]
         reference = next((r for r in done if r["varied"] == "reference"), None)
+        if not reference:
+            self.notes.append(NO_REFERENCE)
         for row in done if reference else []:
             if row is not reference and all(row[k] == reference[k] for k in ("vertices", "membrane_viscosity_N_s_per_m")):
                 row["extent_error_pc"] = 100 * np.sqrt(((row["_extent"] / reference["_extent"] - 1) ** 2).mean())
@@ -327,7 +332,7 @@ class CellInTube(Problem):
         done = [r for r in rows if r["code"] == 0]
         references = [r for r in done if r["varied"] == "reference"]
         if len(references) < 2:
-            self.notes.append("The reference runs did not finish: there are no errors.")
+            self.notes.append(NO_REFERENCE)
             return
         finest, same_mesh = references
         for row in done:

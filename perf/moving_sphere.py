@@ -8,9 +8,10 @@ parabola in time, which takes out the smooth effect of the walls.
 """
 import os, pathlib, sys, tempfile
 
-import numpy as np
-
 import study
+
+study.need("numpy")
+import numpy as np
 
 SIDE, WARM_US, TRAVEL_US = 16.12, 20.0, 60.0
 CASE = """

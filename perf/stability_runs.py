@@ -48,8 +48,8 @@ class Series:
 class Study:
     """Runs each setup once, however many rows ask for it."""
 
-    def __init__(self, scale, work):
-        self.scale, self.work, self.memory, self.lock = scale, work, {}, threading.Lock()
+    def __init__(self, scale, work, limit):
+        self.scale, self.work, self.limit, self.memory, self.lock = scale, work, limit, {}, threading.Lock()
 
     def run(self, setup):
         with self.lock:
@@ -59,9 +59,16 @@ class Study:
                 number = len(self.memory)
         if known is not None:
             return known.result()
-        future.set_result(study.run(setup.case, setup.overrides, self.work / f"{number:03d}", threads=1,
-                                    timeout_s=self.scale.timeout_s))
+        future.set_result(self.start(setup, self.work / f"{number:03d}"))
         return future.result()
+
+    def start(self, setup, folder):
+        if not self.limit.allows():
+            return self.limit.no_run(folder)
+        allowed = min(self.scale.timeout_s, self.limit.left_s)
+        run = study.run(setup.case, setup.overrides, folder, threads=1, timeout_s=allowed)
+        # One that ran out of the study's time, not its own, says nothing about the program.
+        return self.limit.no_run(folder) if run.code is None and allowed < self.scale.timeout_s else run
 
 
 @dataclasses.dataclass
@@ -167,6 +174,8 @@ def cell_speed(reference):
 
 def axial_diameter(study, setup, run):
     other = study.run(Setup(setup.case, setup.overrides | {"stretching.steps": 64}))
+    if not other.done:
+        return None
     return abs(run.history[-1]["axial_um"] - other.history[-1]["axial_um"]), 0.05
 
 

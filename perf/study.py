@@ -2,7 +2,6 @@
 import csv
 import dataclasses
 import datetime
-import importlib.util
 import json
 import os
 import pathlib
@@ -14,14 +13,10 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "perf" / "results"
+NO_TIME = "not run: out of time"
 
-
-def need(*modules):
-    """End with what to do if this Python lacks one of them."""
-    missing = [name for name in modules if importlib.util.find_spec(name) is None]
-    if missing:
-        sys.exit(f"{sys.executable} has no {', '.join(missing)}: setup.sh installs what is needed for the system's Python, "
-                 f"so put /usr/bin first in PATH; or: {sys.executable} -m pip install {' '.join(missing)}")
+sys.path.append(str(ROOT / "cases"))
+from python_with import need  # noqa: E402, F401 (the studies use it)
 
 
 def program():
@@ -57,21 +52,48 @@ class Run:
         return self.code == 0
 
 
-def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, options=()):
-    """Run `case` (a path, or the text of a case) with {"section.key": value} overrides in `folder`."""
+class Limit:
+    """When a study has to come to its end: runs that get no time, or not enough, are named on its page."""
+
+    def __init__(self, minutes):
+        self.stop_at = time.time() + 60 * minutes
+
+    @property
+    def left_s(self):
+        return self.stop_at - time.time()
+
+    def allows(self, seconds=0.0):
+        return self.left_s > seconds
+
+    @staticmethod
+    def no_run(folder=None):
+        """In place of a run for which there is no time left."""
+        return Run(None, 0.0, {}, [], NO_TIME, folder)
+
+
+def add_limit(parser, minutes):
+    parser.add_argument("--minutes", type=float, default=minutes,
+                        help="start no run after this, stop one that takes longer, and write the page with what there is")
+
+
+def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, options=(), bound=None, path=None):
+    """Run `case` (a path, or the text of a case) with {"section.key": value} overrides in `folder`.
+
+    `bound`: whether threads keep to their cores; `path`: of another program than program().
+    """
     folder = pathlib.Path(folder or tempfile.mkdtemp(prefix="corpuscle_"))
     folder.mkdir(parents=True, exist_ok=True)
     if "\n" in str(case):
-        path = folder / "case.toml"
-        path.write_text(case)
+        file = folder / "case.toml"
+        file.write_text(case)
     else:
-        path = ROOT / "cases" / case if (ROOT / "cases" / str(case)).exists() else pathlib.Path(case)
-    command = [str(program()), "run", str(path), "--out", str(folder), *options]
+        file = ROOT / "cases" / case if (ROOT / "cases" / str(case)).exists() else pathlib.Path(case)
+    command = [str(path or program()), "run", str(file), "--out", str(folder), *options]
     for key, value in (overrides or {}).items():
         command += ["--set", f"{key}={toml(value)}"]
     # Threads that are bound would be bound to the same cores as those of other runs beside this one.
-    bound = "true" if ranks == 1 and threads > 1 else "false"
-    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), OMP_PROC_BIND=bound)
+    bound = ranks == 1 and threads > 1 if bound is None else bound
+    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), OMP_PROC_BIND=toml(bound))
     if ranks > 1:
         environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         command = ["mpirun", "-n", str(ranks), "--oversubscribe"] + command
@@ -80,7 +102,7 @@ def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, o
         result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=timeout_s)
         code, text = result.returncode, result.stdout + result.stderr
     except subprocess.TimeoutExpired as stopped:
-        code, text = None, f"stopped after {timeout_s} s"
+        code, text = None, f"stopped after {timeout_s:.3g} s"
     wall = time.time() - start
     report, history = {}, []
     if (folder / "report.json").exists():
@@ -90,7 +112,8 @@ def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, o
             history = [{k: float(v) if v not in ("", None) else float("nan") for k, v in row.items()}
                        for row in csv.DictReader(file)]
     errors = [line for line in text.splitlines() if "error" in line and not line.startswith("errors:")]
-    return Run(code, wall, report, history, errors[-1] if errors and code != 0 else "", folder)
+    message = text if code is None else errors[-1] if errors and code != 0 else ""
+    return Run(code, wall, report, history, message, folder)
 
 
 def toml(value):
