@@ -1,0 +1,76 @@
+#!/usr/bin/env python3
+"""Every study ends with its page, whatever the time allowed: study_pages.py STUDY, with CORPUSCLE naming the program.
+
+Started by ctest. Exit code 77, which ctest takes as skipped, where no Python has what the studies need.
+"""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+# By study: its page, and runs of it (options, what the page must say). A twelfth of a minute and less ends some in the middle.
+ALL = "not run: out of time"
+STUDIES = {
+    "error_vs_time": ("error_vs_time.md", [
+        (["--quick", "--minutes", "0"], ["# Error against wall time", " 0 of ", ALL, "Cell in the straight tube"]),
+        (["--quick", "--problem", "e_stretching", "--minutes", "0.11"], ["Stretching to 200 pN", ALL, "The reference did not"])]),
+    "stability": ("stability.md", [
+        (["--quick", "--minutes", "0"], ["# Stability map", ALL]),
+        (["--quick", "--axis", "tolerances", "--minutes", "0.1"], ["# Stability map", "not run"])]),
+    "kernels": ("kernels.md", [(["--minutes", "0"], ["# Kernels of", ALL]), (["--minutes", "0.005"], ["# Kernels of", ALL])]),
+    "busy": ("busy.md", [(["--minutes", "0"], ["# The tube beside", "No ratio", ALL]),
+                         (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
+    "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
+                                           (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
+}
+
+
+def start(command, **environment):
+    return subprocess.run(command, env=dict(os.environ, **environment), capture_output=True, text=True, timeout=110)
+
+
+def check(condition, what):
+    if not condition:
+        sys.exit(f"study_pages.py: {what}")
+
+
+def check_study(name):
+    page, runs = STUDIES[name]
+    for options, parts in runs:
+        with tempfile.TemporaryDirectory() as folder:
+            result = start([str(ROOT / "perf" / name), *options, "--out", folder])
+            said = f"{name} {' '.join(options)} says\n{result.stdout}{result.stderr}"
+            if "no Python found here" in result.stderr:
+                sys.exit(77)
+            check(result.returncode == 0 and "Traceback" not in result.stderr, f"exit code {result.returncode}: {said}")
+            check((pathlib.Path(folder) / page).exists(), f"no page: {said}")
+            text = (pathlib.Path(folder) / page).read_text()
+            for part in parts:
+                check(part in text, f"the page does not say '{part}':\n{text}")
+
+
+def check_python():
+    """A first python3 on the path that has nothing, as pyenv's: the scripts go on under another."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = start([sys.executable, "-m", "venv", "--without-pip", folder])
+        if made.returncode:
+            sys.exit(77)
+        bare = str(pathlib.Path(folder) / "bin/python3")
+        path = f"{pathlib.Path(bare).parent}:{os.environ['PATH']}"
+        check(start([bare, "-c", "import h5py"]).returncode != 0, "a bare Python has h5py: this test can not fail")
+        for name in ("cases/plot.py", "perf/error_vs_time", "perf/stability", "perf/compare_outlines.py"):
+            result = start(["python3", str(ROOT / name), "--help"], PATH=path)
+            if "no Python found here" in result.stderr:
+                sys.exit(77)
+            check(result.returncode == 0 and "usage:" in result.stdout, f"{name} under a bare Python says\n"
+                  f"{result.stdout}{result.stderr}")
+        script = f"import sys; sys.path.insert(0, '{ROOT}/cases'); sys.argv = ['x.py']\nimport python_with\n"
+        result = start([bare, "-c", script + "python_with.need('no_such_module')"], PATH=path)
+        check(result.returncode == 1 and "x.py: no Python found here has no_such_module" in result.stderr
+              and f"{bare} -m pip install no_such_module" in result.stderr, f"no advice: {result.stderr}")
+
+
+if __name__ == "__main__":
+    check_python() if sys.argv[1] == "python" else check_study(sys.argv[1])
