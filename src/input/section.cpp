@@ -55,8 +55,11 @@ std::string whole_text(const toml::node& node) {
 }  // namespace
 
 std::string toml_text(const toml::node& node) {
-  const auto text = whole_text(node);
-  return text.size() <= 120 ? text : text.substr(0, 117) + "...";
+  constexpr std::size_t longest = 120;
+  const std::string dots = "...";
+  auto text = whole_text(node);
+  if (text.size() > longest) text.replace(longest - dots.size(), std::string::npos, dots);
+  return text;
 }
 
 Section::Section(const CaseSource& source, std::string path, const toml::table* table)
