@@ -1,7 +1,7 @@
 #include "grid/generators.hpp"
 
-#include "core/error.hpp"
 #include "grid/node_file.hpp"
+#include "grid/tube_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -103,12 +103,7 @@ NodeSource straight_tube(const GridSettings& s) {
 NodeSource swept_tube(const GridSettings& s) {
   const std::array<int, 3> cells{s.nodes[0] - 1, s.nodes[1] - 1, s.nodes[2] - 1};
   const Centerline line(s);
-  if (line.largest_curvature() * 0.5 * s.diameter_um >= 0.95)
-    throw InputError(fmt::format(
-        "grid: the centreline bends with a radius of {:.3g} um, too tight for a tube of {:.3g} um diameter: the grid "
-        "would fold. Use a radius of curvature above {:.3g} um (grid.points_um, grid.arc_radius_um) or a smaller "
-        "grid.diameter_um",
-        1 / line.largest_curvature(), s.diameter_um, 0.55 * s.diameter_um));
+  check_tube(line, s.diameter_um);
   std::vector<Centerline::Frame> sections;
   for (int k = 0; k <= cells[2]; ++k) sections.push_back(line.at(line.length() * k / cells[2]));
   return {cells, [disk = disk_points(s), cells, sections](int i, int j, int k) {
