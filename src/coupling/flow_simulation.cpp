@@ -1,6 +1,7 @@
 #include "coupling/flow_simulation.hpp"
 
 #include "core/error.hpp"
+#include "coupling/flow_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -33,6 +34,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
     : timers_(timers), schedule_(scene.time) {
   const auto scope = timers_.scope("set-up");
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
+  check_prescribed_flow(*grid_, scene.boundaries);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (!scene.cells.empty() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_);
 }

@@ -172,7 +172,7 @@ void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape
   largest_speed_ = std::max(largest_speed_, strongest * grid_->comm().max(largest));
 }
 
-double BoundaryConditions::time_factor(const BoundarySettings& s, double t) const {
+double time_factor(const BoundarySettings& s, double t) {
   const double ramp = s.ramp_us > 0 ? std::clamp(t / s.ramp_us, 0.0, 1.0) : 1.0;
   return ramp * (s.time_table.empty() ? 1.0 : interpolate(s.time_table, t));
 }

@@ -7,6 +7,10 @@
 
 namespace corpuscle {
 
+/// What the velocities of an inlet or moving wall are multiplied with at time t, us: linear between the ends of its ramp
+/// and the rows of its table, constant beyond.
+double time_factor(const BoundarySettings& settings, double t);
+
 class BoundaryConditions {
  public:
   /// @param settings  one entry per side (periodic sides included); the reader has checked that none is missing
@@ -54,7 +58,6 @@ class BoundaryConditions {
   void set_profile(const Side& side, const GridSettings* shape);
   template <class Velocity>
   void fill_sides(const Velocity& u, bool homogeneous) const;
-  double time_factor(const BoundarySettings& settings, double t) const;
 
   Grid* grid_;
   std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges

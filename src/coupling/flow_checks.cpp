@@ -1,0 +1,163 @@
+#include "coupling/flow_checks.hpp"
+
+#include "common/vec3.hpp"
+#include "core/error.hpp"
+#include "core/units.hpp"
+#include "fluid/boundary_conditions.hpp"
+#include "input/case_checks.hpp"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+using Type = BoundarySettings::Type;
+
+/// What one side lets through while its factor of time is 1.
+struct SideFlux {
+  Triple outward{};       // sum of the faces' area vectors, um2
+  double area = 0;        // um2
+  double through = 0;     // um3/us, sum of |v . n| over the faces, for a velocity that is a vector
+  double flux = 0;        // um3/us, out of the block
+};
+
+Vec3 node(const Grid& grid, const int (&at)[3]) {
+  const auto& n = grid.index().n;
+  const std::size_t entry = at[0] + (n[0] + 1) * (at[1] + std::size_t(n[1] + 1) * at[2]);
+  const double* x = grid.owned_nodes().data() + 3 * entry;
+  return {x[0], x[1], x[2]};
+}
+
+/// @param visit  called with the area vector, pointing out of the block, of each of this rank's faces on the side
+template <class Visit>
+void visit_faces(const Grid& grid, BoundarySettings::Side side, const Visit& visit) {
+  const IndexSpace& index = grid.index();
+  const int d = static_cast<int>(side) / 2, e = (d + 1) % 3, f = (d + 2) % 3;
+  const bool high = static_cast<int>(side) % 2 == 1;
+  if (high ? index.first[d] + index.n[d] != index.global[d] : index.first[d] != 0) return;
+  int at[3];
+  at[d] = high ? index.n[d] : 0;
+  const auto corner = [&](int a, int b) {
+    int moved[3] = {at[0], at[1], at[2]};
+    moved[e] += a, moved[f] += b;
+    return node(grid, moved);
+  };
+  for (at[f] = 0; at[f] < index.n[f]; ++at[f])
+    for (at[e] = 0; at[e] < index.n[e]; ++at[e]) {
+      const Vec3 upward = 0.5 * cross(corner(1, 1) - corner(0, 0), corner(0, 1) - corner(1, 0));
+      visit(high ? upward : -upward);
+    }
+}
+
+std::vector<SideFlux> measure_sides(const Grid& grid, const std::vector<BoundarySettings>& boundaries) {
+  std::vector<double> sums(5 * boundaries.size(), 0);
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    const Triple v = boundaries[b].velocity.value_or(Triple{});
+    double* own = sums.data() + 5 * b;
+    visit_faces(grid, boundaries[b].side, [&](const Vec3& area) {
+      for (int m = 0; m < 3; ++m) own[m] += area[m];
+      own[3] += norm(area);
+      own[4] += std::abs(dot(area, Vec3{v[0], v[1], v[2]}));
+    });
+  }
+  grid.comm().sum(sums.data(), static_cast<int>(sums.size()));
+  std::vector<SideFlux> sides(boundaries.size());
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    const double* own = sums.data() + 5 * b;
+    SideFlux& side = sides[b];
+    side.outward = {own[0], own[1], own[2]};
+    side.area = own[3];
+    side.through = own[4];
+    const auto& s = boundaries[b];
+    if (s.velocity)
+      for (int m = 0; m < 3; ++m) side.flux += (*s.velocity)[m] * side.outward[m];
+    else if (s.type == Type::velocity_inlet)
+      side.flux = -s.speed * std::hypot(own[0], own[1], own[2]);
+  }
+  return sides;
+}
+
+void check_moving_walls(const std::vector<BoundarySettings>& boundaries, const std::vector<SideFlux>& sides) {
+  constexpr double rounding = 1e-5;  // of the speed: node coordinates may come from a file in single precision
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    if (boundaries[b].type != Type::moving_wall) continue;
+    const Triple& v = *boundaries[b].velocity;
+    const double across = sides[b].through / sides[b].area;
+    if (across <= rounding * std::hypot(v[0], v[1], v[2])) continue;
+    throw InputError(fmt::format(
+        "boundary.{}.velocity_mm_per_s = [{:.4g}, {:.4g}, {:.4g}]: a moving wall must not move through itself, and {} would "
+        "with {:.3g} mm/s on average; give a velocity along the wall, or make the side a \"velocity_inlet\"",
+        b, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[b].side),
+        across / units::mm_per_s));
+  }
+}
+
+/// Times between which every factor is linear in time.
+std::vector<double> corners_in_time(const std::vector<BoundarySettings>& boundaries) {
+  std::vector<double> times{0};
+  for (const auto& s : boundaries) {
+    if (s.ramp_us > 0) times.push_back(s.ramp_us);
+    for (const auto& row : s.time_table) times.push_back(row[0]);
+  }
+  return times;
+}
+
+[[noreturn]] void refuse_net_flux(const std::vector<BoundarySettings>& boundaries, const std::vector<SideFlux>& sides,
+                                  double time, double net) {
+  std::vector<std::string> parts;
+  double steady = 0;
+  int last = -1;
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    if (boundaries[b].type != Type::velocity_inlet) continue;
+    const double flux = time_factor(boundaries[b], time) * sides[b].flux;
+    parts.push_back(fmt::format("{:.4g} um3/us {} through {} (boundary.{}.velocity_mm_per_s)", std::abs(flux),
+                                flux > 0 ? "out" : "in", name_of(boundaries[b].side), b));
+    steady += sides[b].flux;
+    if (!boundaries[b].velocity) last = static_cast<int>(b);
+  }
+  std::string remedy = "make one of these sides \"outflow\"";
+  if (std::abs(steady) < 1e-3 * std::abs(net))
+    remedy += ", or give them ramp_us and time_table that agree";
+  else if (last >= 0)
+    remedy += fmt::format(", or let them cancel, for example with boundary.{}.velocity_mm_per_s = {:.6g}", last,
+                          (boundaries[last].speed + steady / std::hypot(sides[last].outward[0], sides[last].outward[1],
+                                                                        sides[last].outward[2])) /
+                              units::mm_per_s);
+  throw InputError(fmt::format(
+      "boundary: the prescribed velocities do not conserve volume: at {:.4g} us {}, a net flux of {:.4g} um3/us {} that has no "
+      "other way {}; {}",
+      time, fmt::join(parts, ", "), std::abs(net), net > 0 ? "out" : "in", net > 0 ? "in" : "out", remedy));
+}
+
+}  // namespace
+
+void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>& boundaries) {
+  const auto of_type = [&](Type type) {
+    return std::any_of(boundaries.begin(), boundaries.end(), [&](const auto& s) { return s.type == type; });
+  };
+  const bool walls = of_type(Type::moving_wall), inlets = of_type(Type::velocity_inlet);
+  if (!walls && !inlets) return;
+  const auto sides = measure_sides(grid, boundaries);
+  check_moving_walls(boundaries, sides);
+  if (!inlets || of_type(Type::outflow)) return;
+  // Speeds that a user worked out from areas with four digits; the solver spreads what is left over the inlets.
+  constexpr double balanced = 1e-3;
+  double most = 0, worst = 0, when = 0;
+  for (double t : corners_in_time(boundaries)) {
+    double net = 0, gross = 0;
+    for (std::size_t b = 0; b < boundaries.size(); ++b) {
+      if (boundaries[b].type != Type::velocity_inlet) continue;
+      const double flux = time_factor(boundaries[b], t) * sides[b].flux;
+      net += flux, gross += std::abs(flux);
+    }
+    most = std::max(most, gross);
+    if (std::abs(net) > std::abs(worst)) worst = net, when = t;
+  }
+  if (std::abs(worst) > balanced * most) refuse_net_flux(boundaries, sides, when, worst);
+}
+
+}  // namespace corpuscle
