@@ -3,7 +3,7 @@
 #include "common/vec3.hpp"
 #include "immersed/surface_motion.hpp"
 #include "membrane/mesh_generator.hpp"
-#include "membrane/mesh_io.hpp"
+#include "membrane/surface_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -40,16 +40,13 @@ void rotation_matrix(const Triple& omega, double t, double (&r)[3][3]) {
 TriangleMesh make_body_mesh(const BodySettings& body, double spacing) {
   TriangleMesh mesh;
   if (body.shape == BodySettings::Shape::file) {
-    mesh = read_mesh(body.file);
-    check_closed_surface(mesh, body.file);
+    mesh = read_body_surface(body).mesh;
   } else {
     const double a = body.radius_um;
     const Triple axes = body.shape == BodySettings::Shape::sphere ? Triple{a, a, a} : body.semi_axes_um;
     mesh = ellipsoid_mesh(axes, body.vertices > 0 ? body.vertices : suitable_vertices(axes, spacing));
   }
-  for (auto& x : mesh.vertices)
-    for (int m = 0; m < 3; ++m) x[m] += body.center_um[m];
-  return mesh;
+  return transform(mesh, body.axis, body.spin_deg, body.center_um);
 }
 
 RigidBodies::RigidBodies(const std::vector<BodySettings>& bodies, const SurfaceSet& surfaces, int first_body)

@@ -57,6 +57,13 @@ CellSettings read_cell(Section& s, bool placed) {
     s.unused("vertices", "the mesh file decides how many vertices the cell has: leave out vertices or mesh");
     c.vertices = 0;
   }
+  for (const char* key : {"scale", "recenter", "align"})
+    if (c.mesh.empty()) s.unused(key, "only a cell with a mesh file has this key");
+  if (!c.mesh.empty()) {
+    c.scale = s.number("scale", positive(), c.scale);
+    c.recenter = s.flag("recenter", c.recenter);
+    c.align = s.flag("align", c.align);
+  }
   c.center_um = placed ? s.triple("center_um", any_number()) : s.triple("center_um", any_number(), Triple{});
   c.axis = read_axis(s);
   c.spin_deg = s.number("spin_deg", between(-360, 360), c.spin_deg);
@@ -87,12 +94,20 @@ BodySettings read_body(Section& s) {
   if (needs(Shape::ellipsoid, "ellipsoid", "semi_axes_um")) b.semi_axes_um = s.triple("semi_axes_um", positive());
   if (needs(Shape::file, "file", "file")) b.file = s.file("file", true);
   check_surface_file(s, "file", b.file);
+  if (needs(Shape::file, "file", "scale")) b.scale = s.number("scale", positive(), b.scale);
+  if (needs(Shape::file, "file", "recenter")) b.recenter = s.flag("recenter", b.recenter);
   if (b.shape == Shape::file)
     s.unused("vertices", "the file decides how many vertices the body has");
   else
     b.vertices = s.integer("vertices", 0, 100000, b.vertices);
   if (b.vertices != 0 && b.vertices < 42) s.fail("vertices", "must be 0 (chosen from the grid) or from 42 to 100000");
   b.center_um = s.triple("center_um", any_number());
+  if (b.shape == Shape::sphere) {
+    for (const char* key : {"axis", "spin_deg"}) s.unused(key, "a sphere is the same whichever way it is turned");
+  } else {
+    b.axis = read_axis(s);
+    b.spin_deg = s.number("spin_deg", between(-360, 360), b.spin_deg);
+  }
   b.velocity_um_per_us = scaled(s.triple("velocity_mm_per_s", any_number(), Triple{}), units::mm_per_s);
   b.angular_velocity_rad_per_us =
       scaled(s.triple("angular_velocity_rad_per_s", any_number(), Triple{}), units::rad_per_s);

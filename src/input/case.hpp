@@ -82,7 +82,10 @@ struct CellSettings {
 
   int vertices = 500;
   std::string mesh;                     // OFF or STL file instead of the built-in biconcave shape; "" if none
-  Triple center_um{};
+  double scale = 1;                     // mesh: um per unit of the file
+  bool recenter = true;                 // mesh: center_um is the centroid of its volume; false: the file's origin
+  bool align = true;                    // mesh: if it is a disc, its own axis is the symmetry axis; false: the file's z
+  Triple center_um{};                   // of the cell's volume
   Triple axis{0, 0, 1};                 // direction of the cell's symmetry axis
   double spin_deg = 0;                  // rotation of the mesh about that axis
   double mass_pg = 100;
@@ -108,7 +111,11 @@ struct BodySettings {
   double radius_um = 0;
   Triple semi_axes_um{};
   std::string file;                     // OFF or STL
-  Triple center_um{};
+  double scale = 1;                     // file: um per unit of the file
+  bool recenter = false;                // file: center_um is the centroid of its volume; false: the file's origin
+  Triple center_um{};                   // of a sphere or ellipsoid; for a file see recenter
+  Triple axis{0, 0, 1};                 // ellipsoid, file: where its own z axis points
+  double spin_deg = 0;                  // ellipsoid, file: rotation about that axis
   Triple velocity_um_per_us{};
   Triple angular_velocity_rad_per_us{}; // about center_um
 

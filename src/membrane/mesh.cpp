@@ -21,29 +21,6 @@ Vec3 area_vector(const TriangleMesh& mesh, const std::array<int, 3>& t) {
   return 0.5 * cross(vec(mesh.vertices[t[1]]) - a, vec(mesh.vertices[t[2]]) - a);
 }
 
-/// One side of one triangle; sorting these brings the sides that share an edge together.
-struct Side {
-  int low, high, triangle, corner;
-  bool rising;  // runs from low to high in its triangle's order
-  bool operator<(const Side& b) const {
-    return std::tie(low, high, triangle, corner) < std::tie(b.low, b.high, b.triangle, b.corner);
-  }
-  bool same_edge(const Side& b) const { return low == b.low && high == b.high; }
-};
-
-std::vector<Side> sorted_sides(const TriangleMesh& mesh) {
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.triangles.size());
-  for (int t = 0; t < int(mesh.triangles.size()); ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = mesh.triangles[t][(k + 1) % 3], b = mesh.triangles[t][(k + 2) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), t, k, a < b});
-    }
-  }
-  std::sort(sides.begin(), sides.end());
-  return sides;
-}
-
 [[noreturn]] void refuse(const std::string& name, const std::string& what, const std::string& remedy) {
   throw InputError(fmt::format("surface {}: {}; {}", name, what, remedy));
 }
@@ -144,6 +121,21 @@ void check_fans(const TriangleMesh& mesh, const std::string& name) {
 }
 
 }  // namespace
+
+std::vector<TriangleSide> sorted_sides(const TriangleMesh& mesh) {
+  std::vector<TriangleSide> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (int t = 0; t < int(mesh.triangles.size()); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = mesh.triangles[t][(k + 1) % 3], b = mesh.triangles[t][(k + 2) % 3];
+      sides.push_back({std::min(a, b), std::max(a, b), t, k, a < b});
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const TriangleSide& a, const TriangleSide& b) {
+    return std::tie(a.low, a.high, a.triangle, a.corner) < std::tie(b.low, b.high, b.triangle, b.corner);
+  });
+  return sides;
+}
 
 double area(const TriangleMesh& mesh) {
   double sum = 0;

@@ -30,6 +30,16 @@ double volume(const TriangleMesh& mesh);
 /// @throws InputError  if the axis has no length
 TriangleMesh transform(const TriangleMesh& mesh, const Triple& axis, double spin_deg, const Triple& center);
 
+/// One side of one triangle, opposite `corner`.
+struct TriangleSide {
+  int low, high, triangle, corner;
+  bool rising;  // runs from vertex low to vertex high in its triangle's order
+  bool same_edge(const TriangleSide& b) const { return low == b.low && high == b.high; }
+};
+
+/// All sides of all triangles, those that share an edge beside each other.
+std::vector<TriangleSide> sorted_sides(const TriangleMesh& mesh);
+
 /// For each triangle, the one across the edge opposite corner 0, 1, 2. The mesh must be a closed manifold.
 std::vector<std::array<int, 3>> triangle_neighbours(const TriangleMesh& mesh);
 

@@ -7,10 +7,19 @@
 
 namespace corpuscle {
 
-/// Read an OFF or STL file (ASCII or binary, told apart by content). Coordinates are taken as um. Vertices of an STL
-/// file that coincide within 1e-6 of its size are merged.
-/// @throws InputError  if the file cannot be read, is truncated, or is neither
-TriangleMesh read_mesh(const std::string& path);
+/// What a surface file holds. Nothing is known of the surface yet: it may be open, or more than one.
+struct MeshFile {
+  TriangleMesh mesh;               // in the file's own unit
+  std::vector<int> part;           // [triangle] the solid of an STL file that it belongs to; empty for OFF
+  std::vector<std::string> parts;  // names of the solids, as messages put them
+  std::vector<std::string> notes;  // what was left out or put right, for the user
+};
+
+/// Read an OFF or STL file (ASCII or binary, told apart by content). Vertices that coincide within 1e-6 of the size of
+/// the surface become one where triangles do not share their corners: in STL files, and OFF files that are open as they
+/// stand. Triangles that this leaves without area, and vertices that no triangle uses, are left out.
+/// @throws InputError  if the file cannot be read, is damaged (naming line or byte), or is neither
+MeshFile read_mesh(const std::string& path);
 
 /// @throws InputError  if the file cannot be written
 void write_off(const std::string& path, const TriangleMesh& mesh);

@@ -10,7 +10,7 @@
 #include "core/units.hpp"
 #include "membrane/coarse_graining.hpp"
 #include "membrane/mesh_generator.hpp"
-#include "membrane/mesh_io.hpp"
+#include "membrane/surface_file.hpp"
 
 namespace corpuscle {
 
@@ -52,9 +52,7 @@ CellLaw make_law(const CellSettings& c) {
 
 TriangleMesh make_mesh(const CellSettings& c) {
   if (c.mesh.empty()) return biconcave_mesh(c.vertices);
-  TriangleMesh mesh = read_mesh(c.mesh);
-  check_closed_surface(mesh, c.mesh);
-  return mesh;
+  return read_cell_surface(c).mesh;
 }
 
 /// Lengths, signed angles and areas of the mesh as it is.
@@ -87,7 +85,7 @@ void measure(CellReference& r) {
 }
 
 auto type_key(const CellSettings& c) {
-  return std::tie(c.vertices, c.mesh, c.mass_pg, c.reference, c.shear_modulus_uN_per_m, c.bending_modulus_fJ,
+  return std::tie(c.vertices, c.mesh, c.scale, c.recenter, c.align, c.mass_pg, c.reference, c.shear_modulus_uN_per_m, c.bending_modulus_fJ,
                   c.area_modulus_uN_per_m, c.local_area_modulus_uN_per_m, c.volume_modulus_Pa,
                   c.membrane_viscosity_N_s_per_m, c.dissipation);
 }

@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "core/units.hpp"
+#include "membrane/inertia.hpp"
 #include "membrane/membrane_setup.hpp"
 #include "membrane/relaxation.hpp"
 
@@ -133,17 +134,12 @@ StretchingResult stretch_cell(Membranes& membranes, const StretchingSettings& se
   return result;
 }
 
-DiscShape disc_shape(const TriangleMesh& mesh) {
+DiscShape disc_shape(const TriangleMesh& placed) {
   DiscShape shape;
-  Triple lower = mesh.vertices[0], upper = lower, mean{};
-  for (const Triple& p : mesh.vertices) {
-    for (int d = 0; d < 3; ++d) {
-      lower[d] = std::min(lower[d], p[d]);
-      upper[d] = std::max(upper[d], p[d]);
-      mean[d] += p[d] / double(mesh.vertices.size());
-    }
-  }
-  shape.diameter_um = 0.5 * (upper[0] - lower[0] + upper[1] - lower[1]);
+  const PrincipalAxes axes = principal_axes(placed);
+  const TriangleMesh mesh = turn_to_z(placed, disc_axis(axes).value_or(Triple{0, 0, 1}), axes.centroid);
+  const Triple extent = extents(mesh);
+  shape.diameter_um = 0.5 * (extent[0] + extent[1]);
   // Length of the line x, y = const inside the surface: heights where it goes up through the surface, less those where
   // it goes down.
   const auto chord = [&](double x, double y) {
@@ -161,7 +157,9 @@ DiscShape disc_shape(const TriangleMesh& mesh) {
     }
     return length;
   };
-  shape.thickness_center_um = chord(mean[0], mean[1]);
+  // A little beside the axis, which in a symmetric mesh meets vertices and edges.
+  const double aside = 1e-7 * shape.diameter_um;
+  shape.thickness_center_um = chord(aside, 0.7 * aside);
   for (const auto& t : mesh.triangles) {
     // Through the middle of each triangle, so that no line meets an edge or a vertex of its own.
     double x = 0, y = 0;

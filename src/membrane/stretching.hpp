@@ -19,11 +19,11 @@ struct StretchingStep {
   CellDiagnostics cell;
 };
 
-/// Of a cell whose symmetry axis is z.
+/// Of a cell about the centroid of its volume and its own axis; of one that is no disc, about z.
 struct DiscShape {
-  double diameter_um = 0;          // mean of the extents along x and y
-  double thickness_center_um = 0;  // along z through the centroid
-  double thickness_max_um = 0;     // along z through the middle of any triangle
+  double diameter_um = 0;          // mean of the extents along two directions across the axis
+  double thickness_center_um = 0;  // along the axis through the centroid
+  double thickness_max_um = 0;     // along the axis through the middle of any triangle
 };
 
 struct StretchingResult {

@@ -221,6 +221,15 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell("mesh = \"missing.off\""), {":12: cells.0.mesh", "there is no file", "missing.off"});
   const auto mesh = (cases / "mills2004.csv").string();
   require_parts(cell("mesh = \"" + mesh + "\""), {":12: cells.0.mesh", "OFF or STL"});
+  for (const char* key : {"scale = 2", "recenter = false", "align = false"})
+    require_parts(cell(key), {":12: cells.0." + std::string(key), "only a cell with a mesh file"});
+  const auto surface = (fs::temp_directory_path() / "corpuscle_surface.off").string();
+  std::ofstream(surface) << "read later\n";
+  const std::string from_file = "mesh = \"" + surface + "\"\n";
+  REQUIRE(cell(from_file + "scale = 1000\nrecenter = false\nalign = false") == "accepted");
+  require_parts(cell(from_file + "scale = 0"), {":13: cells.0.scale = 0", "above 0"});
+  require_parts(cell(from_file + "recenter = 1"), {":13: cells.0.recenter = 1", "true or false"});
+  require_parts(cell(from_file + "recentre = true"), {":13: cells.0.recentre", "did you mean 'recenter'?"});
   require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"iterated\", \"loose\""});
   require_parts(cell("[coupling]\ntolerance = 1"), {":13: coupling.tolerance = 1", "from 1e-12 to 0.5"});
   require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
@@ -237,7 +246,24 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(body("shape = \"sphere\"\nradius_um = 1\nvertices = 5"), {":14: bodies.0.vertices = 5", "42"});
   require_parts(body("shape = \"sphere\"\nradius_um = 1\nvelocity_um_per_us = [0, 0, 1]"),
                 {":14: bodies.0.velocity_um_per_us", "did you mean 'velocity_mm_per_s'?"});
+  for (const char* key : {"axis = [1, 0, 0]", "spin_deg = 10"})
+    require_parts(body("shape = \"sphere\"\nradius_um = 1\n" + std::string(key)), {":14: bodies.0.", "a sphere is the same"});
+  const std::string ellipsoid = "shape = \"ellipsoid\"\nsemi_axes_um = [1, 1, 2]\n";
+  REQUIRE(body(ellipsoid + "axis = [1, 0, 0]\nspin_deg = 10") == "accepted");
+  require_parts(body(ellipsoid + "axis = [0, 0, 0]"), {":14: bodies.0.axis", "must not be zero"});
+  require_parts(body(ellipsoid + "scale = 2"), {":14: bodies.0.scale = 2", "only shape = \"file\""});
+  REQUIRE(body("shape = \"file\"\nfile = \"" + surface + "\"\nscale = 0.001\nrecenter = true\naxis = [0, 1, 0]") == "accepted");
+  fs::remove(surface);
   require_parts(body("shape = \"sphere\"\nradius_um = 1\n[coupling]"), {":14: coupling: there are no [[cells]]"});
+}
+
+TEST_CASE("a long value is shortened in a message") {
+  std::string list = "[0";
+  for (int i = 0; i < 60; ++i) list += ", 0";
+  const auto found = message(replaced(flow, "nodes = [5, 5, 5]", "nodes = " + list + "]"));
+  require_parts(found, {":6: grid.nodes = [0, 0, ", "...: must be three whole numbers"});
+  const auto value = found.substr(found.find("= ") + 2);
+  REQUIRE(value.find("...") + 3 == 120);
 }
 
 TEST_CASE("modules that contradict each other are refused") {
