@@ -104,7 +104,8 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
     if (drift > senseless_area)
       throw ComputationError(fmt::format(
           "membrane: the area of cells.{} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
-          "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell; reduce the flow "
+          "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
+          "tell (grid.nodes); reduce the flow "
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
           "cells.{}.area_modulus_uN_per_m",
           c, 100 * drift, 100 * lysis_area, c));

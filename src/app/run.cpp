@@ -3,6 +3,7 @@
 #include "app/error_estimate.hpp"
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
+#include "app/surfaces.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/restart.hpp"
@@ -33,6 +34,7 @@ void print_start(const Comm& comm, const Case& scene) {
        comm.size() == 1 ? "" : "s", thread_count(), thread_count() == 1 ? "" : "s");
   print_modules(list_modules(scene, comm.size()));
   for (const auto& line : outputs_left_out(scene.output)) warn("{}", line);
+  print_surfaces(scene);
 }
 
 Report start_report(const Comm& comm, const Case& scene) {
@@ -120,9 +122,10 @@ Report run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
     }
   } catch (const ComputationError& error) {
     progress.finish();
+    const std::string coarse = simulation.coupling() ? simulation.coupling()->coarse() : "";
     throw ComputationError(fmt::format(
-        "at {:.6g} us (step {}): {}. Last good checkpoint: {}", simulation.time() + simulation.next_step_us(),
-        simulation.steps() + 1, error.what(),
+        "at {:.6g} us (step {}): {}. {}Last good checkpoint: {}", simulation.time() + simulation.next_step_us(),
+        simulation.steps() + 1, error.what(), coarse.empty() ? "" : "But first: " + coarse + ". ",
         output.last_checkpoint().empty() ? "none yet (output.checkpoint_every_us)" : output.last_checkpoint()));
   }
   progress.finish();

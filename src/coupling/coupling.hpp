@@ -41,6 +41,8 @@ class Coupling {
   /// Traction of the fluid on the bodies' vertices at the end of the last step, [vertex, 3] kPa, the same on all ranks;
   /// zero before the first step. Worked out now where the step itself did not need it.
   virtual const Components<double>& tractions_for_output() = 0;
+  /// Which bodies the grid resolves coarsely, as check_start() warned of; "" if none.
+  virtual std::string coarse() const { return {}; }
   /// For a step of that length; nothing where no membrane is coupled.
   virtual std::optional<StabilityEstimate> stability(double) const { return std::nullopt; }
 

@@ -13,6 +13,7 @@ class SharpCoupling : public Coupling {
   void check_start() override;
   StepStatistics advance(double time_us, double dt_us) override;
   const Components<double>& tractions_for_output() override;
+  std::string coarse() const override { return coarse_; }
 
   const SurfaceSet& surfaces() const override { return *surfaces_; }
   Membranes* membranes() override { return membranes_.get(); }
@@ -34,6 +35,7 @@ class SharpCoupling : public Coupling {
   std::unique_ptr<ImmersedFlow> immersed_;
 
  private:
+  std::string coarse_;
   bool has_flow_ = false;  // a step has been made: there are tractions to be had
 };
 

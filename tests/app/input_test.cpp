@@ -130,7 +130,7 @@ TEST_CASE("cells that overlap, or stand closer than the grid can resolve") {
   succeed(folder, two_cells("10"));
 }
 
-TEST_CASE("surfaces that are open or inside out") {
+TEST_CASE("surfaces that are open are refused, those inside out turned with a word") {
   const auto folder = fresh_folder("surfaces");
   const auto whole = mesh_file(folder, "same.off", [](Words&) {});
   const auto open_mesh = mesh_file(folder, "open.off", open);
@@ -149,8 +149,41 @@ TEST_CASE("surfaces that are open or inside out") {
   for (const auto& words : {cell(open_mesh), body(open_mesh)})
     fail(folder, words, 2, {"open.off", "open", "edge between vertices", "close the hole"});
   for (const auto& words : {cell(turned), body(turned)})
-    fail(folder, words, 2, {"turned.off", "inside-out", "reverse the vertex order"});
+    CHECK_THAT(succeed(folder, words).output, Contains("its triangles faced inward: all are turned"));
   fail(folder, cell((folder / "missing.off").string()), 2, {"cells.0.mesh", "missing.off", "no file"});
+}
+
+TEST_CASE("check and run say what a surface file holds") {
+  const auto folder = fresh_folder("said");
+  // A disc of 5 x 1.5 um that lies on its side, in mm: two squares' corners and two poles.
+  std::ofstream(folder / "lying.off") << "# of a drawing\nCOFF 6 8 12\n2.5e-3 0 0 9 9 9\n0 0 2.5e-3 9 9 9\n-2.5e-3 0 0 9 9 9\n"
+                                         "0 0 -2.5e-3 9 9 9\n0 0.75e-3 0 9 9 9\n0 -0.75e-3 0 9 9 9\n3 1 0 4\n3 2 1 4\n3 3 2 4\n"
+                                         "3 0 3 4\n3 0 1 5\n3 1 2 5\n3 2 3 5\n3 3 0 5\n";
+  std::ofstream(folder / "lying.toml") << "[[cells]]\nmesh = \"lying.off\"\n[stretching]\nforce_pN = 1\nsteps = 1\n";
+  fail(folder, {"check", "lying.toml"}, 2, {"lying.off", "0.005 um", "cells.scale = 1000 (a file in mm)"});
+  const auto said = succeed(folder, with({"check", "lying.toml"}, {"cells.0.scale=1000"})).output;
+  for (const char* part : {"cells.0: ", "6 vertices, 8 triangles", "extents 5 x 1.5 x 5 um", "area ", "volume 6.25 um3",
+                           "with the axis (0, 1, 0)", "warning: cells.0: it is a disc whose axis (0, 1, 0) is 90 degrees"})
+    CHECK_THAT(said, Contains(part));
+}
+
+TEST_CASE("scenes that cannot be are refused before anything runs") {
+  const auto folder = fresh_folder("scenes");
+  const auto tube = [&](const Words& settings) {
+    Words all{"grid.nodes=[17,17,25]", "time.end_us=4"};
+    all.insert(all.end(), settings.begin(), settings.end());
+    return with({"check", scene("tube_flow")}, all);
+  };
+  auto two_inlets = contents(scene("tube_flow"));
+  const auto at = two_inlets.find("type = \"outflow\"");
+  REQUIRE(at != std::string::npos);
+  two_inlets.replace(at, 16, "type = \"velocity_inlet\"\nvelocity_mm_per_s = 2\nprofile = \"parabolic\"\nramp_us = 20");
+  std::ofstream(folder / "two_inlets.toml") << two_inlets;
+  succeed(folder, tube({}));
+  fail(folder, {"check", "two_inlets.toml"}, 2, {"do not conserve volume", "boundary.", "um3/us"});
+  // 4 um along the axis of a cell that is 0.8 to 2.5 um thick.
+  fail(folder, with({"check", scene("straight_tube")}, {"grid.nodes=[21,21,126]", "grid.length_um=500", "time.end_us=40"}), 2,
+       {"cells.0: the grid is too coarse", "spacing over thickness", "grid.nodes"});
 }
 
 TEST_CASE("results that cannot be written") {

@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/error.hpp"
+#include "grid/spacing_map.hpp"
 #include "grid_fixture.hpp"
 
 using namespace corpuscle;
@@ -181,4 +182,59 @@ TEST_CASE("a swept tube keeps its radius and refuses a bend that folds it", "[gr
   CHECK_THROWS_AS(make_node_source(arc(5.2, 90)), InputError);
   CHECK_THROWS_WITH(make_node_source(arc(5.2, 90)), Catch::Contains("fold") && Catch::Contains("arc_radius_um"));
   CHECK_NOTHROW(make_node_source(arc(5.5, 90)));
+}
+
+TEST_CASE("a swept tube that runs through itself is refused with the place", "[grid]") {
+  const auto refused = [](const GridSettings& s, const std::string& place) {
+    CHECK_THROWS_WITH(make_node_source(s), Catch::Contains("runs through itself") && Catch::Contains(place));
+  };
+  GridSettings s = spline();  // 10 um wide
+  SECTION("a loop that crosses itself") {
+    s.points_um = {{-40, 0, 0}, {0, 0, 0}, {30, 20, 0}, {0, 45, 0}, {-30, 20, 2}, {0, -1, 4}, {40, -10, 4}};
+    refused(s, "comes back to");
+  }
+  SECTION("two ends side by side") {
+    s.points_um = {{0, 0, 0}, {0, 0, 30}, {0, 0, 60}, {0, 15, 75}, {0, 30, 60}, {0, 20, 30}, {0, 8, 0}};
+    refused(s, "um from where it was at");
+  }
+  SECTION("turns of a helix too low") {
+    s = helix();
+    s.helix_pitch_um = 9.5;  // the tube's diameter is 10 um, the turns' distance across the slant 9.45
+    refused(s, "grid.helix_pitch_um");
+    s.helix_pitch_um = 0.01;
+    refused(s, "grid.helix_pitch_um");
+  }
+  SECTION("but not when it comes near itself") {
+    s = helix();
+    s.helix_pitch_um = 10.2;
+    CHECK_NOTHROW(make_node_source(s));
+    CHECK_NOTHROW(make_node_source(arc(5.4, 350)));
+    CHECK_NOTHROW(make_node_source(spline()));
+    s = spline();
+    s.points_um = {{0, 0, 0}, {0, 0, 30}, {0, 0, 60}, {0, 15, 75}, {0, 30, 60}, {0, 20, 30}, {0, 12, 0}};
+    CHECK_NOTHROW(make_node_source(s));
+  }
+}
+
+TEST_CASE("the tightest bend is named with its place", "[grid]") {
+  GridSettings s = spline();
+  s.points_um = {{0, 0, 0}, {0, 0, 30}, {0, 1, 31}, {0, 31, 31}};  // a corner
+  CHECK_THROWS_WITH(make_node_source(s), Catch::Contains("fold") && Catch::Contains("at (0, ") && Catch::Contains("grid.points_um"));
+}
+
+TEST_CASE("the spacing of nodes, place by place and across the grid lines", "[grid]") {
+  GridSettings box;
+  box.nodes = {5, 9, 17};
+  box.upper_um = {4, 4, 4};  // 1 x 0.5 x 0.25 um
+  const Grid grid(Comm(), make_node_source(box), {false, false, false});
+  const SpacingMap map(grid);
+  CHECK(map.upper() == Triple{4, 4, 4});
+  const NodeSteps steps = map.near({1, 1, 1}, {2, 2, 2});
+  CHECK(steps.spacing({1, 0, 0}) == Approx(1).epsilon(1e-12));
+  CHECK(steps.spacing({0, 1, 0}) == Approx(0.5).epsilon(1e-12));
+  CHECK(steps.spacing({0, 0, 1}) == Approx(0.25).epsilon(1e-12));
+  CHECK(steps.spacing({0, 0.6, 0.8}) == Approx(std::hypot(0.6 * 0.5, 0.8 * 0.25)).epsilon(1e-12));
+  CHECK(steps.along(1, {0, 0.6, 0.8}) == Approx(std::pow(0.6 * 0.5, 2)).epsilon(1e-12));
+  // Outside of the grid: the mean of it.
+  CHECK(map.near({40, 40, 40}, {41, 41, 41}).spacing({0, 0, 1}) == Approx(0.25).epsilon(1e-12));
 }

@@ -1,0 +1,25 @@
+// Whether cells and bodies fit the grid and each other, before the first step.
+#pragma once
+
+#include "grid/spacing_map.hpp"
+#include "immersed/surface.hpp"
+
+namespace corpuscle {
+
+/// How a grid resolves a body: at each of its vertices, the spacing of nodes across it over how thick it is there.
+struct Resolution {
+  double largest = 0;  // where the body is thinnest, as the grid sees it
+  double typical = 0;  // exceeded over half of the surface
+  double thickness_um = 0, spacing_um = 0;  // where it is largest
+  std::array<double, 3> share{};  // of the grid's index directions in `typical`: the ones to refine
+};
+
+/// Resolution of each body at its present position, by a few hundred of its vertices.
+std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces);
+
+/// Warns of bodies that the grid resolves coarsely.
+/// @returns what it warned of, for messages about a run that breaks down later; "" if nothing
+/// @throws InputError  for a body that is larger than the grid, not resolved by it, inside another or across it
+std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces);
+
+}  // namespace corpuscle
