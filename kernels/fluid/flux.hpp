@@ -1,6 +1,7 @@
 // Volume fluxes on faces: interpolation from the nodes, divergence, and the correction by the projection.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid_views.hpp"
 #include "grid/halo_copy.hpp"
@@ -135,16 +136,16 @@ inline void scalar_from_compact(const IndexSpace& index, const Array<double>& ve
   });
 }
 
-/// Largest magnitude in a compact vector.
+/// Largest magnitude in a compact vector; not a number if any entry is not.
 inline double largest_magnitude(const Array<double>& vector) {
   double largest = 0;
   Kokkos::parallel_reduce(
       "corpuscle::fluid::largest_magnitude", Policy(0, static_cast<int>(vector.extent(0))),
       KOKKOS_LAMBDA(int e, double& most) {
         const double a = vector(e) < 0 ? -vector(e) : vector(e);
-        if (!(a <= most)) most = a;
+        most = larger(most, a);
       },
-      Kokkos::Max<double>(largest));
+      Largest(largest));
   return largest;
 }
 

@@ -1,6 +1,7 @@
 // Reductions over the flow field.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "fluid/embedded.hpp"
 #include "fluid/momentum.hpp"
 
@@ -64,7 +65,7 @@ inline int unmarked_cells(const IndexSpace& index, const Array<NodeKind>& kind, 
   return count;
 }
 
-/// Largest velocity magnitude at fluid nodes; not a number if any is.
+/// Largest velocity magnitude at fluid nodes, 0 without any; not a number if any is not.
 inline double largest_speed(const IndexSpace& index, const Array<NodeKind>& kind, const Components<double>& u) {
   double square = 0;
   reduce_owned("corpuscle::fluid::largest_speed", index,
@@ -72,10 +73,10 @@ inline double largest_speed(const IndexSpace& index, const Array<NodeKind>& kind
                  const int c = index.cell(i, j, k);
                  if (kind(c) != NodeKind::fluid) return;
                  const double s = dot(load(u, c), load(u, c));
-                 if (!(s <= most)) most = s;
+                 most = larger(most, s);
                },
-               Kokkos::Max<double>(square));
-  return std::sqrt(square);
+               Largest(square));
+  return std::sqrt(larger(square, 0));
 }
 
 /// Sum of squares of a vector field over fluid nodes.

@@ -17,9 +17,9 @@ inline double poiseuille_difference(const GridViews& grid, const Components<doub
         const int c = index.cell(e % index.n[0], e / index.n[0], k);
         const double r2 = x(c, 0) * x(c, 0) + x(c, 1) * x(c, 1);
         const Vec3 difference = load(u, c) - Vec3{0, 0, 2 * mean * (1 - r2 / (radius * radius))};
-        if (dot(difference, difference) > most) most = dot(difference, difference);
+        most = larger(most, dot(difference, difference));
       },
-      Kokkos::Max<double>(square));
+      Largest(square));
   return std::sqrt(square);
 }
 
@@ -48,9 +48,9 @@ inline double couette_difference(const GridViews& grid, const Components<double>
                  const int c = index.cell(i, j, k);
                  const double s = (x(c, d) - lower) / (upper - lower);
                  const Vec3 difference = load(u, c) - ((1 - s) * low + s * high);
-                 if (dot(difference, difference) > most) most = dot(difference, difference);
+                 most = larger(most, dot(difference, difference));
                },
-               Kokkos::Max<double>(square));
+               Largest(square));
   return std::sqrt(square);
 }
 

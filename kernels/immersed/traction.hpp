@@ -1,6 +1,7 @@
 // Fluid stress on the surfaces, from one-sided weighted least-squares fits around each vertex.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "immersed/own_side.hpp"
 #include "immersed/reconstruct.hpp"
 #include "immersed/surface_stress.hpp"
@@ -317,9 +318,9 @@ inline Slip surface_slip(const StencilInput& input, const PlaceViews& places, co
           here[d] = right[d][0];
         }
         square += dot(here, here);
-        largest = norm(here) > largest ? norm(here) : largest;
+        largest = larger(largest, norm(here));
       },
-      slip.square, Kokkos::Max<double>(slip.largest));
+      slip.square, Largest(slip.largest));
   return slip;
 }
 

@@ -1,6 +1,7 @@
 // Energies and shape of each membrane, for output.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "membrane/forces.hpp"
 
 namespace corpuscle {
@@ -82,18 +83,18 @@ inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
                 const Vec3 side =
                     load(x, m.surface.triangle(t, (k + 2) % 3)) - load(x, m.surface.triangle(t, (k + 1) % 3));
                 const double ratio = norm(side) / m.rest_length(t + shift, k) * SpringLaw::x0;
-                if (!(ratio <= largest)) largest = ratio;
+                largest = larger(largest, ratio);
               }
             },
-            Kokkos::Max<double>(stretch));
+            Largest(stretch));
         Sums<3> lower, upper;
         for (int d = 0; d < 3; ++d) {
           Kokkos::parallel_reduce(
               Kokkos::TeamThreadRange(team, first, last),
-              [&](int i, double& low) { low = x(i, d) < low ? x(i, d) : low; }, Kokkos::Min<double>(lower[d]));
+              [&](int i, double& low) { low = smaller(low, x(i, d)); }, Smallest(lower[d]));
           Kokkos::parallel_reduce(
               Kokkos::TeamThreadRange(team, first, last),
-              [&](int i, double& high) { high = x(i, d) > high ? x(i, d) : high; }, Kokkos::Max<double>(upper[d]));
+              [&](int i, double& high) { high = larger(high, x(i, d)); }, Largest(upper[d]));
         }
         Kokkos::single(Kokkos::PerTeam(team), [&]() {
           const double area = section_total(m.totals, cell, 0), volume = section_total(m.totals, cell, 1);

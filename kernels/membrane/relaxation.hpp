@@ -2,6 +2,7 @@
 // Moseler & Gumbsch 2006), with unit masses, all cells at once.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "membrane/forces.hpp"
 
 namespace corpuscle {
@@ -102,7 +103,7 @@ inline void move_relaxation(const MembraneViews& m, const RelaxationViews& w, co
       });
 }
 
-/// Largest force on any vertex at the last gather, nN. Waits for the device.
+/// Largest force on any vertex at the last gather, nN; not a number if any is not. Waits for the device.
 inline double largest_force(const MembraneViews& m, const RelaxationViews& w) {
   double largest = 0;
   Kokkos::parallel_reduce(
@@ -110,9 +111,9 @@ inline double largest_force(const MembraneViews& m, const RelaxationViews& w) {
       KOKKOS_LAMBDA(int i, double& high) {
         const Vec3 f = load(w.force, i);
         const double size = dot(f, f);
-        if (!(size <= high)) high = size;
+        high = larger(high, size);
       },
-      Kokkos::Max<double>(largest));
+      Largest(largest));
   return std::sqrt(largest);
 }
 

@@ -1,6 +1,7 @@
 #include "app/flow_output.hpp"
 
 #include "app/reference_flows.hpp"
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "core/units.hpp"
 #include "coupling/restart.hpp"
@@ -73,8 +74,8 @@ void FlowOutput::gather() {
   pressure_.add(fluid.pressure_iterations);
   const double spacing = simulation_.grid().mean_spacing();
   if (fluid.reference_speed > 0)
-    divergence_ = std::max(divergence_, fluid.divergence / (fluid.reference_speed * spacing * spacing));
-  flux_correction_ = std::max(flux_correction_, fluid.flux_correction);
+    divergence_ = larger(divergence_, fluid.divergence / (fluid.reference_speed * spacing * spacing));
+  flux_correction_ = larger(flux_correction_, fluid.flux_correction);
   if (!simulation_.membranes()) return;
   coupling_.add(simulation_.statistics().coupling_iterations);
   substeps_.add(simulation_.statistics().substeps);
@@ -98,10 +99,10 @@ void FlowOutput::after_step(bool start) {
 
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    volume_drift_ = std::max(volume_drift_, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
+    volume_drift_ = larger(volume_drift_, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
     const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
-    area_drift_ = std::max(area_drift_, drift);
-    if (drift > senseless_area)
+    area_drift_ = larger(area_drift_, drift);
+    if (!(drift <= senseless_area))
       throw ComputationError(fmt::format(
           "membrane: the area of cells.{} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
           "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
@@ -203,7 +204,7 @@ void FlowOutput::write_cells() {
   if (simulation_.steps() > 0) {
     simulation_.coupling()->tractions_for_output();
     const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
-    slip_ = std::max(slip_, simulation_.immersed()->slip()[1] / speed);
+    slip_ = larger(slip_, simulation_.immersed()->slip()[1] / speed);
   }
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;

@@ -1,5 +1,6 @@
 #include "coupling/energy_balance.hpp"
 
+#include "common/extremes.hpp"
 #include "immersed/surface_work.hpp"
 
 #include <algorithm>
@@ -13,7 +14,7 @@ namespace {
 double largest_term(const EnergyTotals& t) {
   double largest = 0;
   for (double term : {t.boundaries, t.gradient, t.dissipation, t.kinetic, t.on_bodies, t.elastic})
-    largest = std::max(largest, std::abs(term));
+    largest = larger(largest, std::abs(term));
   return largest;
 }
 
@@ -21,7 +22,7 @@ double largest_term(const EnergyTotals& t) {
 double kept_by_membranes(const EnergyTotals& t) { return t.elastic + t.membrane_dissipation + t.membrane_kinetic; }
 
 std::optional<double> share(double left_over, double scale) {
-  if (!(scale > 0)) return std::nullopt;
+  if (scale <= 0) return std::nullopt;
   return std::abs(left_over) / scale;
 }
 

@@ -1,5 +1,6 @@
 #include "coupling/immersed_flow.hpp"
 
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "grid/metrics.hpp"
 #include "immersed/surface_motion.hpp"
@@ -76,8 +77,8 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   comm.max(worst, 5);
   any_uncovered_ = worst[4] > 0;
   const double to_wall = -worst[1], between = -worst[3];
-  report_.least_wall_spacings = std::min(report_.least_wall_spacings, to_wall);
-  report_.least_body_spacings = std::min(report_.least_body_spacings, between);
+  report_.least_wall_spacings = smaller(report_.least_wall_spacings, to_wall);
+  report_.least_body_spacings = smaller(report_.least_body_spacings, between);
   const long found = comm.sum(static_cast<long>(counts.owned_vertices));
   int vertex = static_cast<int>(worst[0]);
   if (vertex >= 0 || found < surfaces_.vertices) {

@@ -195,7 +195,7 @@ void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
 /// @param speed  change of the mean velocity through some faces, um/us
 void FluidSolver::note_correction(double speed) {
   const double reference = std::max(statistics_.reference_speed, 1e-30);
-  statistics_.flux_correction = std::max(statistics_.flux_correction, speed / reference);
+  statistics_.flux_correction = larger(statistics_.flux_correction, speed / reference);
 }
 
 /// The fluxes around each body add up to its growth. Where nothing can leave the block, what all bodies together grow by
@@ -318,7 +318,7 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
         std::isfinite(residual) ? "senselessly large numbers" : "not a number"));
   solve_momentum(bodies, residual);
   statistics_.reference_speed =
-      std::max(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
+      larger(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
   project(bodies);
   ++statistics_.solves;
   grid_->halo().exchange(p_);

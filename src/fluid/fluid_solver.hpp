@@ -2,6 +2,7 @@
 // implicit, rotational incremental fractional step.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "core/timers.hpp"
 #include "fluid/boundary_conditions.hpp"
 #include "fluid/embedded.hpp"
@@ -64,7 +65,7 @@ class FluidSolver {
   double viscosity() const { return mu_; }
   /// Velocity scale of tolerances: never below the largest speed seen.
   void raise_reference_speed(double speed) {
-    if (speed > statistics_.reference_speed) statistics_.reference_speed = speed;
+    statistics_.reference_speed = larger(statistics_.reference_speed, speed);
   }
   /// Imposed mean pressure gradient, kPa/um.
   const Vec3& imposed_gradient() const { return imposed_gradient_; }

@@ -1,5 +1,6 @@
 #include "grid/grid.hpp"
 
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "grid/metrics.hpp"
 
@@ -52,9 +53,9 @@ double smallest_offset(const GridViews& grid, int d) {
       KOKKOS_LAMBDA(int e, double& least) {
         const int i = e % index.n[0], j = (e / index.n[0]) % index.n[1], k = e / (index.n[0] * index.n[1]);
         const double distance = 2 * norm(central_offset(x, index.cell(i, j, k), index.stride(d)));
-        if (distance < least) least = distance;
+        least = smaller(least, distance);
       },
-      Kokkos::Min<double>(smallest));
+      Smallest(smallest));
   return smallest / 2;
 }
 
@@ -180,9 +181,9 @@ void Grid::measure() {
     const auto mine = sum_cross_coefficients(views_, d, negligible_typical_skewness);
     double sums[2] = {mine.square, mine.above};
     comm_.sum(sums, 2);
-    skewness_ = std::max(skewness_, std::sqrt(sums[0] / total_volume_));
-    skewed_share_ = std::max(skewed_share_, sums[1] / total_volume_);
-    smallest_spacing_ = std::min(smallest_spacing_, comm_.min(smallest_offset(views_, d)));
+    skewness_ = larger(skewness_, std::sqrt(sums[0] / total_volume_));
+    skewed_share_ = larger(skewed_share_, sums[1] / total_volume_);
+    smallest_spacing_ = smaller(smallest_spacing_, comm_.min(smallest_offset(views_, d)));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/extremes.hpp"
 #include "input/case.hpp"
 #include "parallel/comm.hpp"
 
@@ -18,7 +19,7 @@ struct Tally {
   void add(double value) {
     ++samples;
     sum += value;
-    largest = value > largest ? value : largest;
+    largest = larger(largest, value);
   }
 };
 

@@ -1,14 +1,36 @@
 #include "parallel/comm.hpp"
 
+#include "common/extremes.hpp"
+
 namespace corpuscle {
 
 #ifdef CORPUSCLE_MPI
+
+namespace {
+
+void keep_larger(void* from, void* into, int* n, MPI_Datatype*) {
+  const double* a = static_cast<const double*>(from);
+  double* b = static_cast<double*>(into);
+  for (int i = 0; i < *n; ++i) b[i] = larger(a[i], b[i]);
+}
+
+/// MPI_MAX leaves open what becomes of numbers that are none.
+MPI_Op keeping_max() {
+  static const MPI_Op op = [] {
+    MPI_Op made;
+    MPI_Op_create(keep_larger, 1, &made);
+    return made;
+  }();
+  return op;
+}
+
+}  // namespace
 
 void Comm::sum(double* values, int n) const {
   if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm_);
 }
 void Comm::max(double* values, int n) const {
-  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_MAX, comm_);
+  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, keeping_max(), comm_);
 }
 long Comm::sum(long value) const {
   if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_LONG, MPI_SUM, comm_);

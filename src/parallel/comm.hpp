@@ -27,7 +27,7 @@ class Comm {
   int size() const { return size_; }
   bool root() const { return rank_ == 0; }
 
-  /// In place, over all ranks, on host memory.
+  /// In place, over all ranks, on host memory. Extremes are not numbers on all ranks where any rank's is not.
   void sum(double* values, int n) const;
   void max(double* values, int n) const;
   double sum(double value) const { return sum(&value, 1), value; }

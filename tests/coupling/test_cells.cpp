@@ -3,6 +3,7 @@
 
 #include "scenes.hpp"
 
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "membrane/mesh.hpp"
 
@@ -25,7 +26,7 @@ Outcome run(const Case& scene) {
   while (!simulation.done()) {
     simulation.step();
     const auto& s = simulation.fluid().statistics();
-    outcome.divergence = std::max(outcome.divergence, s.divergence / (s.reference_speed * spacing * spacing));
+    outcome.divergence = larger(outcome.divergence, s.divergence / (s.reference_speed * spacing * spacing));
   }
   outcome.mesh = body_mesh(*simulation.surfaces(), 0);
   outcome.cell = simulation.membranes()->diagnostics()[0];

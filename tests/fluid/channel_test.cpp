@@ -28,7 +28,7 @@ double largest_error(FluidSolver& solver, const Exact& exact) {
   double worst = 0;
   visit_owned(solver.grid().index(), [&](int, int, int, int c) {
     const Triple e = exact({x(c, 0), x(c, 1), x(c, 2)});
-    for (int m = 0; m < 3; ++m) worst = std::max(worst, std::abs(u(c, m) - e[m]));
+    for (int m = 0; m < 3; ++m) worst = larger(worst, std::abs(u(c, m) - e[m]));
   });
   return solver.grid().comm().max(worst);
 }

@@ -86,9 +86,9 @@ double row_error(const Scene& s) {
         double sum = divergence(r);
         for (int n = 0; n < pattern.count; ++n)
           sum += rows(r, n) * psi(index.cell(i + pattern.di[n], j + pattern.dj[n], k + pattern.dk[n]));
-        most = std::abs(sum) > most ? std::abs(sum) : most;
+        most = larger(most, std::abs(sum));
       },
-      Kokkos::Max<double>(worst));
+      Largest(worst));
   return worst;
 }
 
@@ -129,12 +129,12 @@ double linear_error(const Scene& s) {
             const double flux = skewed ? face_gradient<true>(p, mask, x, a, coefficient(c), index, d, c)
                                        : face_gradient<false>(p, mask, x, a, coefficient(c), index, d, c);
             const double off = std::abs(flux - dot(slope, a)) / norm(a);
-            error = off > error ? off : error;
+            error = larger(error, off);
           }
-          most = error > most ? error : most;
+          most = larger(most, error);
         },
-        Kokkos::Max<double>(here));
-    worst = std::max(worst, here);
+        Largest(here));
+    worst = larger(worst, here);
   }
   return worst;
 }

@@ -71,11 +71,11 @@ TEST_CASE("velocities and pressures do not depend on the decomposition", "[fluid
   visit_owned(mine.index, [&](int i, int j, int k, int c) {
     const int w = whole.index.cell(i + mine.index.first[0], j + mine.index.first[1], k + mine.index.first[2]);
     for (int m = 0; m < 3; ++m) {
-      worst[0] = std::max(worst[0], std::abs(mine.u(c, m) - whole.u(w, m)));
-      worst[1] = std::max(worst[1], std::abs(whole.u(w, m)));
+      worst[0] = larger(worst[0], std::abs(mine.u(c, m) - whole.u(w, m)));
+      worst[1] = larger(worst[1], std::abs(whole.u(w, m)));
     }
-    worst[2] = std::max(worst[2], std::abs(mine.p(c) - whole.p(w)));
-    worst[3] = std::max(worst[3], std::abs(whole.p(w)));
+    worst[2] = larger(worst[2], std::abs(mine.p(c) - whole.p(w)));
+    worst[3] = larger(worst[3], std::abs(whole.p(w)));
   });
   comm.max(worst, 4);
   INFO("velocity " << worst[0] / worst[1] << " pressure " << worst[2] / worst[3]);

@@ -23,9 +23,9 @@ double worst_closure(const GridViews& grid) {
         const int c = index.cell(i, j, k);
         const Vec3 sum = load(s0, c + index.stride(0)) - load(s0, c) + load(s1, c + index.stride(1)) - load(s1, c) +
                          load(s2, c + index.stride(2)) - load(s2, c);
-        most = norm(sum) > most ? norm(sum) : most;
+        most = larger(most, norm(sum));
       },
-      Kokkos::Max<double>(worst));
+      Largest(worst));
   return worst;
 }
 
@@ -50,11 +50,11 @@ double worst_linear_flux(const GridViews& grid) {
                 flux += g[e] * 0.5 *
                         dot(slope, central_offset(x, c, index.stride(e)) + central_offset(x, low, index.stride(e)));
             const double error = std::abs(flux - dot(slope, s)) / norm(s);
-            most = error > most ? error : most;
+            most = larger(most, error);
           }
         },
-        Kokkos::Max<double>(here));
-    worst = std::max(worst, here);
+        Largest(here));
+    worst = larger(worst, here);
   }
   return worst;
 }

@@ -33,11 +33,11 @@ double worst_location(const GridViews& grid, double& worst_position) {
         lattice.map(q, again, tangent);
         for (int d = 0; d < 3; ++d) {
           const double here = std::fabs(q.xi(d) - there.xi(d));
-          error = here > error ? here : error;
+          error = larger(error, here);
         }
-        gap = norm(again - p) > gap ? norm(again - p) : gap;
+        gap = larger(gap, norm(again - p));
       },
-      Kokkos::Max<double>(worst), Kokkos::Max<double>(position));
+      Largest(worst), Largest(position));
   worst_position = position;
   return worst;
 }

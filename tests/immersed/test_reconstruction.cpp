@@ -38,8 +38,8 @@ Errors reconstruct(const GridViews& grid, ImmersedBoundary& ib, const SurfaceSet
     const double du = norm(load(u_host, node(k)) - u_exact(at)), dp = std::fabs(p_host(node(k)) - p_exact(at));
     REQUIRE(std::isfinite(du));
     REQUIRE(std::isfinite(dp));
-    e.u_max = std::max(e.u_max, du);
-    e.p_max = std::max(e.p_max, dp);
+    e.u_max = larger(e.u_max, du);
+    e.p_max = larger(e.p_max, dp);
     e.u_rms += du * du / ib.counts().immersed;
     e.p_rms += dp * dp / ib.counts().immersed;
   }

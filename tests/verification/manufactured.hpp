@@ -163,7 +163,7 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
   for (int n = 0; n < steps; ++n) {
     solver.begin_step(length[n % 2]);
     solver.solve((n / 2 * 2) * dt + (n % 2) * length[0] + length[n % 2], nullptr);
-    errors.divergence = std::max(errors.divergence, solver.statistics().divergence);
+    errors.divergence = larger(errors.divergence, solver.statistics().divergence);
   }
   const double t = steps * dt, h = grid.mean_spacing();
   errors.divergence /= solver.statistics().reference_speed * h * h;

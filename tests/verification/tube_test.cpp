@@ -37,7 +37,7 @@ TubeErrors errors_at(FluidSolver& solver, int k_global) {
         const double r = std::hypot(x(c, 0), x(c, 1)) / radius;
         const double e[3] = {u(c, 0), u(c, 1), u(c, 2) - centre_speed * (1 - r * r)};
         const double size = std::sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / centre_speed;
-        errors.largest = std::max(errors.largest, size);
+        errors.largest = larger(errors.largest, size);
         sums[0] += volume(c) * size * size;
         sums[1] += volume(c);
         sums[2] += volume(c) * (p(up) - p(down));
@@ -71,7 +71,7 @@ TubeErrors developed_flow(int across, int along, Map map, double ramp, double dt
   for (int n = 1; n <= steps; ++n) {
     solver.begin_step(dt);
     solver.solve(n * dt, nullptr);
-    divergence = std::max(divergence, solver.statistics().divergence / (solver.statistics().reference_speed * h * h));
+    divergence = larger(divergence, solver.statistics().divergence / (solver.statistics().reference_speed * h * h));
   }
   TubeErrors errors = errors_at(solver, static_cast<int>(0.7 * along));
   errors.divergence = divergence;
