@@ -63,13 +63,14 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
   for (auto& level : momentum_->cycle.levels())
     for (int d = 0; d < 3; ++d)
       for (int side = 0; side < 2; ++side) level.views.closed[d][side] = grid.halo().neighbour(d, side) < 0;
-  pressure_cycle_ = std::make_unique<PressureCycle>(*hierarchy_, settings.max_iterations);
+  pressure_cycle_ = std::make_unique<PressureCycle>(*hierarchy_);
   if (skewed_) {
     psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
-    pressure_solver_ =
-        std::make_unique<PressureSolver>(grid.comm(), grid.index(), grid.halo(), true, settings.max_iterations);
-    pressure_solver_->precondition_with(
-        [cycle = pressure_cycle_.get()](const Array<double>& b, const Array<double>& x) { cycle->apply(b, x); });
+    pressure_system_ = std::make_unique<HypreSystem>(grid.comm(), grid.index(), grid.halo(), true);
+    pressure_krylov_ = std::make_unique<PressureKrylov>(
+        *pressure_system_,
+        [cycle = pressure_cycle_.get()](const Array<double>& b, const Array<double>& x) { cycle->apply(b, x); },
+        settings.max_iterations);
   } else {
     multigrid_ =
         std::make_unique<PressureMultigrid>(*hierarchy_, *pressure_cycle_, g_.normal, settings.max_iterations);
@@ -84,14 +85,14 @@ void FluidSolver::update_pressure_equation() {
   momentum_->stale = true;
   pressure_cycle_->update(pinned_);
   if (multigrid_) return multigrid_->update(mask_);
-  pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_solver_->pattern(), pinned_,
-                      pressure_solver_->values());
-  pressure_solver_->set_values();
+  pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_system_->pattern(), pinned_,
+                      pressure_system_->values());
+  pressure_system_->set_values();
 }
 
 KrylovResult FluidSolver::solve_pressure(double target) {
   if (multigrid_) return multigrid_->solve(negative_divergence_, psi_field_, target);
-  const KrylovResult result = pressure_solver_->solve(negative_divergence_, psi_, target);
+  const KrylovResult result = pressure_krylov_->solve(negative_divergence_, psi_, target);
   scalar_from_compact(grid_->index(), psi_, psi_field_);
   return result;
 }

@@ -7,6 +7,7 @@
 #include "fluid/boundary_conditions.hpp"
 #include "fluid/embedded.hpp"
 #include "fluid/momentum.hpp"
+#include "fluid/pressure_krylov.hpp"
 #include "fluid/pressure_multigrid.hpp"
 
 #include <algorithm>
@@ -176,7 +177,8 @@ class FluidSolver {
   std::unique_ptr<Momentum> momentum_;
   std::unique_ptr<PressureCycle> pressure_cycle_;    // preconditioner of both
   std::unique_ptr<PressureMultigrid> multigrid_;     // orthogonal grids
-  std::unique_ptr<PressureSolver> pressure_solver_;  // skewed ones
+  std::unique_ptr<HypreSystem> pressure_system_;     // skewed ones
+  std::unique_ptr<PressureKrylov> pressure_krylov_;
   Components<double> body_force_;
   std::function<void(double)> update_force_;
   FluidStatistics statistics_;

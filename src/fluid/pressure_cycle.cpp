@@ -10,10 +10,10 @@ constexpr Smoothing smoothing{3, 0.2, 2.0};
 
 }  // namespace
 
-PressureCycle::PressureCycle(MultigridHierarchy& hierarchy, int max_iterations)
+PressureCycle::PressureCycle(MultigridHierarchy& hierarchy)
     : cycle_(hierarchy, smoothing),
-      coarsest_(hierarchy.comm(), hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false,
-                max_iterations) {
+      coarsest_(hierarchy.comm(), hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
+      amg_(coarsest_) {
   const int rows = hierarchy.levels().back().views.index.owned();
   coarse_rhs_ = Array<double>("corpuscle::multigrid::coarse_rhs", rows);
   coarse_x_ = Array<double>("corpuscle::multigrid::coarse_x", rows);
@@ -25,7 +25,7 @@ void PressureCycle::update(int pinned) {
   cycle_.update();
   level_rows(cycle_.levels().back().views, coarsest_.values());
   coarsest_.set_values();
-  coarsest_.set_up();
+  amg_.set_up();
 }
 
 void PressureCycle::run() { cycle_.run(static_cast<int>(cycle_.levels().size())); }
@@ -39,7 +39,7 @@ void PressureCycle::apply(const Array<double>& b, const Array<double>& x) {
 
 void PressureCycle::solve_coarsest(Cycle::Level& level) {
   compact_scalar(level.views.index, level.b, coarse_rhs_);
-  coarsest_.cycle(coarse_rhs_, coarse_x_);
+  amg_.cycle(coarse_rhs_, coarse_x_);
   spread_scalar(level.views.index, 1, coarse_x_, level.x);
 }
 

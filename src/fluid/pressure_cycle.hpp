@@ -1,8 +1,8 @@
 // One multigrid cycle for the pressure equation, in single precision, whose coarsest level is left to BoomerAMG.
 #pragma once
 
+#include "fluid/algebraic_multigrid.hpp"
 #include "fluid/multigrid_cycle.hpp"
-#include "fluid/pressure_solver.hpp"
 
 namespace corpuscle {
 
@@ -12,7 +12,7 @@ class PressureCycle {
  public:
   using Cycle = MultigridCycle<Array<CycleReal>>;
 
-  PressureCycle(MultigridHierarchy& hierarchy, int max_iterations);
+  explicit PressureCycle(MultigridHierarchy& hierarchy);
 
   /// Take over the hierarchy's conductances. `pinned` as for pressure_rows.
   void update(int pinned);
@@ -27,7 +27,8 @@ class PressureCycle {
   void solve_coarsest(Cycle::Level& level);
 
   Cycle cycle_;
-  PressureSolver coarsest_;
+  HypreSystem coarsest_;
+  AlgebraicMultigrid amg_;
   Array<double> coarse_rhs_, coarse_x_;
 };
 

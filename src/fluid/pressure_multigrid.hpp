@@ -1,6 +1,7 @@
 // The pressure equation of an orthogonal grid, matrix-free: conjugate gradients preconditioned by a multigrid cycle.
 #pragma once
 
+#include "fluid/bicgstab.hpp"
 #include "fluid/pressure_cycle.hpp"
 
 namespace corpuscle {

@@ -42,7 +42,7 @@ Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const st
   mark_pressure(kind, outflow, mask);
   MultigridHierarchy hierarchy(grid, g.normal);
   hierarchy.update(mask);
-  PressureCycle cycle(hierarchy, 100);
+  PressureCycle cycle(hierarchy);
   cycle.update(with_outflow || !comm.root() ? -1 : index.cell(0, 0, 0));
   PressureMultigrid solver(hierarchy, cycle, g.normal, 100);
   solver.update(mask);
