@@ -91,9 +91,10 @@ void FluidSolver::update_pressure_equation() {
 }
 
 KrylovResult FluidSolver::solve_pressure(double target) {
-  if (multigrid_) return multigrid_->solve(negative_divergence_, psi_field_, target);
-  const KrylovResult result = pressure_krylov_->solve(negative_divergence_, psi_, target);
-  scalar_from_compact(grid_->index(), psi_, psi_field_);
+  const KrylovResult result = multigrid_ ? multigrid_->solve(negative_divergence_, psi_field_, target)
+                                         : pressure_krylov_->solve(negative_divergence_, psi_, target);
+  if (!result.converged) pressure_cycle_->raise();
+  if (!multigrid_) scalar_from_compact(grid_->index(), psi_, psi_field_);
   return result;
 }
 

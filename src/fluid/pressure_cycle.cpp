@@ -10,22 +10,15 @@ constexpr Smoothing smoothing{3, 0.2, 2.0};
 
 }  // namespace
 
-PressureCycle::PressureCycle(MultigridHierarchy& hierarchy)
-    : cycle_(hierarchy, smoothing),
-      coarsest_(hierarchy.comm(), hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
-      amg_(coarsest_) {
-  const int rows = hierarchy.levels().back().views.index.owned();
-  coarse_rhs_ = Array<double>("corpuscle::multigrid::coarse_rhs", rows);
-  coarse_x_ = Array<double>("corpuscle::multigrid::coarse_x", rows);
-  cycle_.solve_coarsest = [this](Cycle::Level& level) { solve_coarsest(level); };
+PressureCycle::PressureCycle(MultigridHierarchy& hierarchy, std::unique_ptr<CoarsestSolver> coarsest)
+    : cycle_(hierarchy, smoothing), coarsest_(coarsest ? std::move(coarsest) : make_coarsest_solver(hierarchy)) {
+  cycle_.solve_coarsest = [this](Cycle::Level& level) { coarsest_->solve(level.views, level.b, level.x); };
 }
 
 void PressureCycle::update(int pinned) {
   pin_level(finest().views, pinned, finest().own);
   cycle_.update();
-  level_rows(cycle_.levels().back().views, coarsest_.values());
-  coarsest_.set_values();
-  amg_.set_up();
+  coarsest_->update(cycle_.levels().back().views);
 }
 
 void PressureCycle::run() { cycle_.run(static_cast<int>(cycle_.levels().size())); }
@@ -35,12 +28,6 @@ void PressureCycle::apply(const Array<double>& b, const Array<double>& x) {
   spread_scalar(index, 1, b, finest().b);
   run();
   compact_scalar(index, finest().x, x);
-}
-
-void PressureCycle::solve_coarsest(Cycle::Level& level) {
-  compact_scalar(level.views.index, level.b, coarse_rhs_);
-  amg_.cycle(coarse_rhs_, coarse_x_);
-  spread_scalar(level.views.index, 1, coarse_x_, level.x);
 }
 
 }  // namespace corpuscle

@@ -1,7 +1,7 @@
-// One multigrid cycle for the pressure equation, in single precision, whose coarsest level is left to BoomerAMG.
+// One multigrid cycle for the pressure equation, in single precision.
 #pragma once
 
-#include "fluid/algebraic_multigrid.hpp"
+#include "fluid/coarsest_solver.hpp"
 #include "fluid/multigrid_cycle.hpp"
 
 namespace corpuscle {
@@ -12,24 +12,24 @@ class PressureCycle {
  public:
   using Cycle = MultigridCycle<Array<CycleReal>>;
 
-  explicit PressureCycle(MultigridHierarchy& hierarchy);
+  /// @param coarsest  what solves the coarsest level; null: what make_coarsest_solver() takes
+  explicit PressureCycle(MultigridHierarchy& hierarchy, std::unique_ptr<CoarsestSolver> coarsest = nullptr);
 
   /// Take over the hierarchy's conductances. `pinned` as for pressure_rows.
+  /// @throws ComputationError  on all ranks, when the coarsest level cannot be set up on any
   void update(int pinned);
   /// finest().x = one cycle for finest().b.
   void run();
   /// x = one cycle for b, compact vectors.
   void apply(const Array<double>& b, const Array<double>& x);
+  /// On all ranks together. @throws ComputationError  on all of them, if a cycle since the last update() has failed on any
+  void raise() { coarsest_->raise(); }
 
   Cycle::Level& finest() { return cycle_.levels()[0]; }
 
  private:
-  void solve_coarsest(Cycle::Level& level);
-
   Cycle cycle_;
-  HypreSystem coarsest_;
-  AlgebraicMultigrid amg_;
-  Array<double> coarse_rhs_, coarse_x_;
+  std::unique_ptr<CoarsestSolver> coarsest_;
 };
 
 }  // namespace corpuscle

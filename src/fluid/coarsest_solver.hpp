@@ -1,0 +1,52 @@
+// The coarsest level of the pressure's multigrid cycle.
+#pragma once
+
+#include "fluid/algebraic_multigrid.hpp"
+#include "fluid/band_solver.hpp"
+#include "fluid/multigrid_hierarchy.hpp"
+
+#include <memory>
+
+namespace corpuscle {
+
+class CoarsestSolver {
+ public:
+  virtual ~CoarsestSolver() = default;
+  /// Take over the level's operator. @throws ComputationError  on all ranks, when that fails on any
+  virtual void update(const MultigridLevel& level) = 0;
+  /// x close to the solution for b, [cell] of the level: a symmetric operator.
+  virtual void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) = 0;
+  /// On all ranks together. @throws ComputationError  on all of them, if solve() has failed on any since the last update()
+  virtual void raise() {}
+};
+
+/// Direct, on one rank: it costs less than setting BoomerAMG up, which has to be done whenever bodies move, and a cycle of it.
+class BandCoarsest : public CoarsestSolver {
+ public:
+  static constexpr int most_rows = 500;
+
+  explicit BandCoarsest(MultigridHierarchy& hierarchy);
+  void update(const MultigridLevel& level) override;
+  void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
+
+ private:
+  BandSystem band_;
+};
+
+/// One cycle of BoomerAMG, for levels of many cells or on several ranks.
+class AmgCoarsest : public CoarsestSolver {
+ public:
+  explicit AmgCoarsest(MultigridHierarchy& hierarchy);
+  void update(const MultigridLevel& level) override;
+  void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
+  void raise() override { system_.errors().raise(system_.comm()); }
+
+ private:
+  HypreSystem system_;
+  AlgebraicMultigrid amg_;
+  Array<double> rhs_, x_;
+};
+
+std::unique_ptr<CoarsestSolver> make_coarsest_solver(MultigridHierarchy& hierarchy);
+
+}  // namespace corpuscle
