@@ -3,6 +3,7 @@
 
 #include "common/extremes.hpp"
 #include "fluid/masked_gradient.hpp"
+#include "fluid/viscosity.hpp"
 #include "grid/grid_views.hpp"
 #include "grid/halo_copy.hpp"
 
@@ -119,14 +120,17 @@ inline void correct_velocity(const GridViews& grid, const Array<NodeKind>& kind,
 /// below 2/3 are stable for any step in three dimensions (Guermond, Minev and Shen, Comput. Methods Appl. Mech. Eng.
 /// 195, 2006) and keep the order; the sphere's force is then steady to five digits. `negative` is -V div u* in
 /// compact order.
-inline void update_pressure(const GridViews& grid, const Array<NodeKind>& kind, double mass, double mu,
-                            const Array<double>& psi, const Array<double>& negative, const Array<double>& p) {
+template <class Viscosity>
+void update_pressure(const GridViews& grid, const Array<NodeKind>& kind, double mass, double mu, const Viscosity& viscosity,
+                     const Array<double>& psi, const Array<double>& negative, const Array<double>& p) {
   constexpr double share = 0.6;
+  const Viscosity relative = viscosity;
   const IndexSpace index = grid.index;
   const auto volume = grid.volume;
   for_owned("corpuscle::fluid::update_pressure", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    if (kind(c) == NodeKind::fluid) p(c) += mass * psi(c) + share * mu * negative(index.compact(i, j, k)) / volume(c);
+    if (kind(c) == NodeKind::fluid) 
+      p(c) += mass * psi(c) + share * mu * relative_viscosity(relative, c) * negative(index.compact(i, j, k)) / volume(c);
   });
 }
 

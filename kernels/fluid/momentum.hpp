@@ -3,6 +3,7 @@
 
 #include "common/vec3.hpp"
 #include "fluid/masked_gradient.hpp"
+#include "fluid/viscosity.hpp"
 #include "grid/grid_views.hpp"
 
 #include <type_traits>
@@ -144,14 +145,16 @@ KOKKOS_INLINE_FUNCTION double convective_face(const Velocity& u, double flux, No
   return 0.5 * flux * (u(c, m) + u(low, m));
 }
 
-/// The momentum operator over mu at fluid nodes: inertia - viscous fluxes [+ convective fluxes with the given face fluxes].
-/// Immersed velocities are eliminated: u holds there what their rows make of the fluid's.
 struct FaceFluxes {
   Array<double> flux[3];
 };
 struct NoFluxes {};
-template <bool skewed, bool convective>
-struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes> {
+
+/// The momentum operator over mu at fluid nodes: inertia - viscous fluxes [+ convective fluxes with the given face fluxes].
+/// Immersed velocities are eliminated: u holds there what their rows make of the fluid's.
+/// @tparam Viscosity  UniformViscosity or VaryingViscosity; mu is the former's, and what the latter is relative to
+template <bool skewed, bool convective, class Viscosity = UniformViscosity>
+struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes>, Viscosity {
   IndexSpace index;
   Array<double> volume;
   Array<NodeKind> kind;
@@ -162,6 +165,7 @@ struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes> {
   KOKKOS_FORCEINLINE_FUNCTION auto apply(const Velocity& u, int c) const {
     using Real = typename Velocity::non_const_value_type;
     Vector3<Real> image = (mass_over_mu * volume(c)) * load(u, c) - viscous_force<skewed>(g, u, index, c);
+    subtract_excess(static_cast<const Viscosity&>(*this), u, kind, index, c, image);
     if constexpr (convective)
       for (int m = 0; m < 3; ++m) {
         double sum = 0;

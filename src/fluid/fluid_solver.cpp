@@ -300,7 +300,9 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
     if (!result.converged) fail_projection(largest, target, round < rounds);
     apply_potential();
     correct_velocity(grid_->views(), kind_, mask_, psi_field_, u_);
-    update_pressure(grid_->views(), kind_, mass_, mu_, psi_field_, negative_divergence_, p_);
+    with_viscosity([&](const auto& viscosity) {
+      update_pressure(grid_->views(), kind_, mass_, mu_, viscosity, psi_field_, negative_divergence_, p_);
+    });
   }
   complete_velocity(bodies);
 }

@@ -78,6 +78,10 @@ class FluidSolver {
   const Array<NodeKind>& kind() const { return kind_; }
   const Array<double> (&flux() const)[3] { return flux_; }
 
+  /// A viscosity that varies in space: `relative` [cell] is its ratio to viscosity(), with valid halos and, at boundary nodes,
+  /// the boundary's. Shared: what is written into it counts from the next solve. Without this call there is one viscosity.
+  void set_viscosity(const Array<double>& relative) { relative_viscosity_ = relative; }
+
   /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
   /// solve, to set it and the given boundary velocities. For manufactured solutions and user forces.
   void set_body_force(const Components<double>& force, std::function<void(double)> update);
@@ -130,7 +134,15 @@ class FluidSolver {
   void note_correction(double speed);
   class Correction;
   template <class Use>
+  void with_viscosity(const Use& use) const {
+    if (!relative_viscosity_.data()) return use(UniformViscosity());
+    const GridViews& grid = grid_->views();
+    use(VaryingViscosity{relative_viscosity_, grid.x, {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
+  }
+  template <class Use>
   void with_operator(const Use& use) const;
+  template <class Viscosity, class Use>
+  void with_operator(const Viscosity& viscosity, const Use& use) const;
   double residual_square();
   void update_momentum_cycle();
   int momentum_depth() const;
@@ -155,6 +167,7 @@ class FluidSolver {
   Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
   Array<NodeKind> kind_;
   PressureMask mask_;
+  Array<double> relative_viscosity_;  // empty: one viscosity
   ViscousCoefficients g_;
   double residual_norm_ = 0;
   Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)

@@ -16,7 +16,13 @@ namespace corpuscle {
 /// Calls `use` with the operator of this grid and these settings.
 template <class Use>
 void FluidSolver::with_operator(const Use& use) const {
+  with_viscosity([&](const auto& viscosity) { with_operator(viscosity, use); });
+}
+
+template <class Viscosity, class Use>
+void FluidSolver::with_operator(const Viscosity& viscosity, const Use& use) const {
   const auto fill = [&](auto a) {
+    static_cast<Viscosity&>(a) = viscosity;
     a.index = grid_->index(), a.volume = grid_->views().volume, a.kind = kind_, a.g = g_;
     if constexpr (std::is_base_of_v<FaceFluxes, decltype(a)>)
       for (int d = 0; d < 3; ++d) a.flux[d] = flux_extrapolated_[d];
@@ -25,13 +31,13 @@ void FluidSolver::with_operator(const Use& use) const {
   };
   const bool implicit = settings_.convection == FluidSettings::Convection::implicit;
   if (skewed_ && implicit)
-    fill(MomentumOperator<true, true>());
+    fill(MomentumOperator<true, true, Viscosity>());
   else if (skewed_)
-    fill(MomentumOperator<true, false>());
+    fill(MomentumOperator<true, false, Viscosity>());
   else if (implicit)
-    fill(MomentumOperator<false, true>());
+    fill(MomentumOperator<false, true, Viscosity>());
   else
-    fill(MomentumOperator<false, false>());
+    fill(MomentumOperator<false, false, Viscosity>());
 }
 
 /// The system A change = residual for bicgstab(). Inner products are those of velocities.

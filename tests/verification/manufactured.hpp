@@ -1,6 +1,6 @@
 // A manufactured Navier-Stokes solution: an Arnold-Beltrami-Childress flow that varies in time, with a pressure of its
 // own, on a skewed curvilinear grid. curl u = u, so the Laplacian is -u and the convective term the gradient of
-// |u|^2/2.
+// |u|^2/2. The viscosity may vary in space.
 #pragma once
 
 #include <cmath>
@@ -12,6 +12,7 @@ namespace corpuscle::manufactured {
 
 struct Flow {
   double rho = 1, mu = 0.3, a = 1.0, b = 0.7, c = 0.4, rate = 2.0;
+  double contrast = 0;  // the viscosity is mu exp(contrast s), s between -1 and 1
   bool convective = true;
   /// Start with sin^3 from rest: then the start has no spatial error, which would leave an error of order h^2 dt.
   bool from_rest = false;
@@ -32,17 +33,36 @@ struct Flow {
   KOKKOS_INLINE_FUNCTION double pressure(const Vec3& x, double t) const {
     return amplitude(t) * std::cos(x.x) * std::sin(x.y) * std::cos(x.z);
   }
+  KOKKOS_INLINE_FUNCTION double relative_viscosity(const Vec3& x) const {
+    return std::exp(contrast * std::sin(1.3 * x.x + 0.4 * x.y) * std::cos(1.1 * x.z - 0.3));
+  }
+  KOKKOS_INLINE_FUNCTION Vec3 relative_viscosity_gradient(const Vec3& x) const {
+    const double a = 1.3 * x.x + 0.4 * x.y, b = 1.1 * x.z - 0.3;
+    return contrast * relative_viscosity(x) *
+           Vec3{1.3 * std::cos(a) * std::cos(b), 0.4 * std::cos(a) * std::cos(b), -1.1 * std::sin(a) * std::sin(b)};
+  }
+  /// du[d] = the shape's derivative along d.
+  KOKKOS_INLINE_FUNCTION void shape_derivatives(const Vec3& x, Vec3 (&du)[3]) const {
+    du[0] = {0, b * std::cos(x.x), -b * std::sin(x.x)};
+    du[1] = {-c * std::sin(x.y), 0, c * std::cos(x.y)};
+    du[2] = {a * std::cos(x.z), -a * std::sin(x.z), 0};
+  }
   KOKKOS_INLINE_FUNCTION Vec3 force(const Vec3& x, double t) const {
     const Vec3 u = shape(x);
     const double f = amplitude(t);
-    Vec3 total = (rho * growth(t) + mu * f) * u;
+    Vec3 du[3];
+    shape_derivatives(x, du);
+    // -div(mu (grad u + grad u^T)) = mu u - grad mu . (grad u + grad u^T)
+    Vec3 total = (rho * growth(t) + mu * relative_viscosity(x) * f) * u;
+    const Vec3 slope = (mu * f) * relative_viscosity_gradient(x);
+    for (int d = 0; d < 3; ++d) {
+      total -= slope[d] * du[d];
+      total[d] -= dot(slope, du[d]);
+    }
     const Vec3 grad_p = {-std::sin(x.x) * std::sin(x.y) * std::cos(x.z), std::cos(x.x) * std::cos(x.y) * std::cos(x.z),
                          -std::cos(x.x) * std::sin(x.y) * std::sin(x.z)};
     total += f * grad_p;
     if (convective) {
-      const Vec3 du[3] = {{0, b * std::cos(x.x), -b * std::sin(x.x)},
-                          {-c * std::sin(x.y), 0, c * std::cos(x.y)},
-                          {a * std::cos(x.z), -a * std::sin(x.z), 0}};
       for (int d = 0; d < 3; ++d) total[d] += rho * f * f * dot(u, du[d]);
     }
     return total;
@@ -140,6 +160,14 @@ inline Errors run(const Comm& comm, const NodeSource& source, double dt, int ste
     sides[s].velocity = Triple{1, 0, 0};
   }
   FluidSolver solver(grid, settings, sides);
+  if (flow.contrast != 0) {
+    const Array<double> relative("corpuscle::test::viscosity", grid.index().size());
+    const auto x = grid.views().x;
+    Kokkos::parallel_for(
+        "corpuscle::test::viscosity", Policy(0, grid.index().size()),
+        KOKKOS_LAMBDA(int e) { relative(e) = flow.relative_viscosity(load(x, e)); });
+    solver.set_viscosity(relative);
+  }
   Components<double> force("corpuscle::test::force", grid.index().size(), 3);
   const auto given = solver.boundaries().given();
   const auto views = grid.views();
