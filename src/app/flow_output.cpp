@@ -5,6 +5,7 @@
 #include "core/error.hpp"
 #include "core/units.hpp"
 #include "coupling/restart.hpp"
+#include "fluid/flow_balances.hpp"
 #include "membrane/shape_measures.hpp"
 #include "output/owned_values.hpp"
 
@@ -258,7 +259,7 @@ void FlowOutput::fill_quantities(Report& report) const {
       if (!cell) all[of + "torque_" + axes[d] + "_nN_um"] = (*sample.torque_nN_um)[d];
     }
   }
-  const Triple mean = simulation_.fluid().mean_velocity();
+  const Triple mean = mean_velocity(simulation_.fluid());
   all["superficial_speed_mm_per_s"] = std::hypot(mean[0], mean[1], mean[2]) / units::mm_per_s;
   if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
 }
@@ -268,7 +269,7 @@ void FlowOutput::fill(Report& report) {
   errors["max_divergence"] = divergence_;
   errors["flux_correction"] = flux_correction_;
   errors["splitting"] = simulation_.fluid().splitting();
-  errors["convection_over_viscosity"] = simulation_.fluid().convection_over_viscosity();
+  errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
   if (simulation_.surfaces()) {
     errors["slip"] = slip_;
     const auto& search = simulation_.immersed()->report();
@@ -296,7 +297,7 @@ void FlowOutput::fill(Report& report) {
   report.pressure_iterations = pressure_;
   report.coupling_iterations = coupling_;
   report.membrane_substeps = substeps_;
-  Triple mean = simulation_.fluid().mean_velocity();
+  Triple mean = mean_velocity(simulation_.fluid());
   for (double& component : mean) component /= units::mm_per_s;
   report.extra["superficial_velocity_mm_per_s"] = mean;
   report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],

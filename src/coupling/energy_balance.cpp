@@ -1,6 +1,7 @@
 #include "coupling/energy_balance.hpp"
 
 #include "common/extremes.hpp"
+#include "fluid/flow_balances.hpp"
 #include "immersed/surface_work.hpp"
 
 #include <algorithm>
@@ -31,7 +32,7 @@ std::optional<double> share(double left_over, double scale) {
 void EnergyBalance::sample(double elastic_fJ) {
   const SurfaceSet* surfaces = simulation_.surfaces();
   FluidSolver& fluid = simulation_.fluid();
-  const FluidEnergy flow = fluid.energy(surfaces ? enclosed_volume(*surfaces) : 0.0);
+  const FluidEnergy flow = flow_energy(fluid, surfaces ? enclosed_volume(*surfaces) : 0.0);
   EnergyTotals now;
   now.boundaries = flow.boundaries_nW;
   now.gradient = flow.gradient_nW;

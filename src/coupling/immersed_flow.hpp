@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/timers.hpp"
-#include "fluid/fluid_solver.hpp"
+#include "fluid/flow_balances.hpp"
 #include "immersed/immersed_boundary.hpp"
 
 #include <array>
@@ -44,7 +44,7 @@ class ImmersedFlow {
   /// from the last tractions, nN and nN um.
   std::vector<std::array<Triple, 2>> loads(const std::vector<Triple>& centre);
   /// The same forces from the fluid's momentum balance over the faces around each body.
-  std::vector<Triple> balance_forces() { return fluid_.body_forces(bodies_); }
+  std::vector<Triple> balance_forces() { return body_forces(fluid_, bodies_); }
   /// Largest and rms difference between the fluid's velocity carried to the surface and the surface's own, um/us.
   std::array<double, 2> slip();
 

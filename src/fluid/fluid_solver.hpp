@@ -6,6 +6,7 @@
 #include "core/timers.hpp"
 #include "fluid/boundary_conditions.hpp"
 #include "fluid/embedded.hpp"
+#include "fluid/fluid_state.hpp"
 #include "fluid/momentum.hpp"
 #include "fluid/pressure_krylov.hpp"
 #include "fluid/pressure_multigrid.hpp"
@@ -21,15 +22,6 @@ struct FluidStatistics {
   double divergence = 0;       // largest net flux out of a fluid cell, um3/us
   double reference_speed = 0;  // um/us: the largest prescribed or computed so far
   double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
-};
-
-/// The flow's energy at one time. Powers are those of the fluid outside bodies.
-struct FluidEnergy {
-  double boundaries_nW = 0;      // in through the sides of the grid: pressure, viscous stress, carried kinetic energy
-  double gradient_nW = 0;        // of the imposed pressure gradient, over the whole volume
-  double dissipation_nW = 0;     // mu times the integral of |grad u|^2
-  double kinetic_fJ = 0;
-  double inflow_um3_per_us = 0;  // through all sides
 };
 
 class FluidSolver {
@@ -73,10 +65,13 @@ class FluidSolver {
 
   /// Velocity [cell, 3] um/us and pressure [cell] kPa with valid halos; node kinds.
   const Components<double>& velocity() const { return u_; }
-  const Components<double>& old_velocity() const { return u_old_; }
   const Array<double>& pressure() const { return p_; }
   const Array<NodeKind>& kind() const { return kind_; }
   const Array<double> (&flux() const)[3] { return flux_; }
+  /// Where the pressure has a value, and the coefficients of viscous face fluxes: with cross ones if skewed().
+  const PressureMask& pressure_mask() const { return mask_; }
+  const ViscousCoefficients& coefficients() const { return g_; }
+  bool skewed() const { return skewed_; }
 
   /// A viscosity that varies in space: `relative` [cell] is its ratio to viscosity(), with valid halos and, at boundary nodes,
   /// the boundary's. Shared: what is written into it counts from the next solve. Without this call there is one viscosity.
@@ -89,34 +84,16 @@ class FluidSolver {
   /// Residual of the momentum equation that the last projection left, over the velocity (both 2-norms): the splitting.
   /// Right after solve() only.
   double splitting() { return momentum_residual(); }
-  /// rms of the convective term over the rms of the viscous term in the present solution: what leaving it out neglects.
-  double convection_over_viscosity();
-  /// @param body_volume  um3, of all bodies: what is left of the cells that their surfaces cut
-  FluidEnergy energy(double body_volume);
-  /// Mean velocity over the whole volume (superficial, bodies count as present), um/us.
-  Triple mean_velocity();
-  /// Force on body `b` from the momentum balance over the faces around it: pressure and viscous stress, nN.
-  std::vector<Triple> body_forces(const EmbeddedBodies& bodies);
 
   /// Owned cells of the multigrid's levels, finest first.
   std::vector<int> multigrid_cells() const;
   /// How many of them the velocity's cycle uses with the present step.
   int velocity_levels() const { return std::min(momentum_->depth + 1, static_cast<int>(hierarchy_->levels().size())); }
 
-  /// What a restart needs for the same bits as without the stop. Views share the solver's memory.
-  struct State {
-    Components<double> u, u_old;
-    Array<double> p;
-    Array<double> flux[3], flux_old[3];   // flux_old only with convection
-    int history_levels = 0;               // how many earlier velocities are valid
-    double reference_speed = 0;
-    double time_us = 0, step_us = 0;      // of u (not filled by state()), and from u_old to u
-    /// The same with memory of its own.
-    State copy() const;
-  };
-  State state() const;
+  /// Views share the solver's memory; the time is left for the caller to fill in.
+  FluidState state() const;
   /// Continue from a state: fields of owned cells are taken, halos are refilled.
-  void restore(const State& state);
+  void restore(const FluidState& state);
 
  private:
   void update_pressure_equation();

@@ -11,7 +11,7 @@
 namespace corpuscle {
 
 /// The matrix keeps its sparsity for the whole run: rows of nodes that are not fluid hold only a diagonal. So a change
-/// of the immersed nodes changes values only.
+/// of the immersed nodes changes values only. One solver a system: it works on the system's two vectors.
 class HypreSystem {
  public:
   /// @param skewed  rows of 19 entries, not 7

@@ -30,7 +30,7 @@ ArrayDrag array_drag(double fraction, int nodes_per_diameter) {
   simulation.immersed()->tractions();
   const double force = simulation.immersed()->loads({simulation.rigid_bodies()->centre(0)})[0][0][2];
   const double drive = 1e-3 * side * side * side;  // the mean gradient pushes on the whole volume
-  const double stokes = 6 * pi * simulation.fluid().viscosity() * radius * simulation.fluid().mean_velocity()[2];
+  const double stokes = 6 * pi * simulation.fluid().viscosity() * radius * mean_velocity(simulation.fluid())[2];
   return {drive / stokes, force / stokes};
 }
 

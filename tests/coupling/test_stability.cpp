@@ -148,7 +148,7 @@ TEST_CASE("a body held in a flow of large nu dt / h^2 feels a steady force", "[c
   std::vector<double> speed;
   while (!simulation.done()) {
     simulation.step();
-    speed.push_back(simulation.fluid().mean_velocity()[2]);
+    speed.push_back(mean_velocity(simulation.fluid())[2]);
     simulation.immersed()->tractions();
     const auto force = simulation.immersed()->loads({scene.bodies[0].center_um})[0][0];
     if (speed.size() > 50) {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "fluid/fluid_solver.hpp"
+#include "fluid/flow_balances.hpp"
 #include "fluid/integrals.hpp"
 
 namespace corpuscle::fluid_test {
