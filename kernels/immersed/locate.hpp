@@ -1,6 +1,7 @@
 // Where the surfaces' vertices are in index space, and who owns them.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "immersed/views.hpp"
 
 namespace corpuscle {
@@ -148,10 +149,10 @@ inline double smallest_spacing_at(const Lattice& lattice, int vertices, const Pl
         for (int d = 0; d < 3; ++d) {
           const double spacing = 0.5 * norm(lattice.position(c + lattice.index.stride(d)) -
                                             lattice.position(c - lattice.index.stride(d)));
-          least = spacing < least ? spacing : least;
+          least = smaller(least, spacing);
         }
       },
-      Kokkos::Min<double>(smallest));
+      Smallest(smallest));
   return smallest;
 }
 

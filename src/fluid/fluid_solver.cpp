@@ -263,7 +263,7 @@ void FluidSolver::fail_projection(double before, double target, bool attempted) 
   }
   failure.divergence = grid_->comm().max(largest_magnitude(negative_divergence_));
   if (!boundaries_.has_outflow()) failure.net_inflow = grid_->comm().sum(sum_of(negative_divergence_));
-  for (const auto& flux : flux_) failure.face_flux = std::max(failure.face_flux, grid_->comm().max(largest_magnitude(flux)));
+  for (const auto& flux : flux_) failure.face_flux = larger(failure.face_flux, grid_->comm().max(largest_magnitude(flux)));
   failure.speed = grid_->comm().max(largest_speed(grid_->index(), kind_, u_));
   failure.earlier_speed =
       std::max(boundaries_.largest_speed(), grid_->comm().max(largest_speed(grid_->index(), kind_, u_old_)));
