@@ -10,9 +10,6 @@ namespace corpuscle {
 
 constexpr int stencil_width = 16;
 
-enum class Reconstruction { linear, quadratic };  // along the normal: one or two probes in the fluid
-enum class PressureExtension { normal, least_squares };
-
 /// How a row came about, from the best to the last resort.
 enum class RowKind : std::int8_t {
   quadratic = 0,      // two probes
@@ -224,13 +221,13 @@ KOKKOS_INLINE_FUNCTION RowKind fitted_velocity_row(const Allowed& allowed, const
   return RowKind::normal_only;
 }
 
-KOKKOS_INLINE_FUNCTION RowKind velocity_row(const Allowed& allowed, const ImmersedNode& p, bool quadratic, Row& row) {
+KOKKOS_INLINE_FUNCTION RowKind velocity_row(const Allowed& allowed, const ImmersedNode& p, Row& row) {
   LatticeStencil first, second;
   double s1 = p.spacing;
   if (!seek_probe(allowed, p, 2.5, s1, first)) return fitted_velocity_row(allowed, p, row);
   const double delta = p.delta, d1 = delta + s1;
   double s2 = s1 + p.spacing;
-  if (quadratic && seek_probe(allowed, p, 2.95, s2, second)) {
+  if (seek_probe(allowed, p, 2.95, s2, second)) {
     const double d2 = delta + s2;
     row.surface = (delta - d1) * (delta - d2) / (d1 * d2);
     row.add(first, delta * (delta - d2) / (d1 * (d1 - d2)));
@@ -242,7 +239,7 @@ KOKKOS_INLINE_FUNCTION RowKind velocity_row(const Allowed& allowed, const Immers
   return RowKind::linear;
 }
 
-KOKKOS_INLINE_FUNCTION RowKind fitted_pressure_row(const Allowed& allowed, const ImmersedNode& p, Row& row) {
+KOKKOS_INLINE_FUNCTION RowKind pressure_row(const Allowed& allowed, const ImmersedNode& p, Row& row) {
   const NearestNodes nearest = nearest_allowed(allowed, p);
   if (nearest.count == 0) return RowKind::surface_only;
   NormalMatrix<4> normal;
@@ -269,21 +266,6 @@ KOKKOS_INLINE_FUNCTION RowKind fitted_pressure_row(const Allowed& allowed, const
   return RowKind::normal_only;
 }
 
-KOKKOS_INLINE_FUNCTION RowKind pressure_row(const Allowed& allowed, const ImmersedNode& p, bool along_normal,
-                                            Row& row) {
-  LatticeStencil first, second;
-  double s1 = p.spacing;
-  if (along_normal && seek_probe(allowed, p, 2.0, s1, first)) {
-    double s2 = s1 + p.spacing;
-    if (seek_probe(allowed, p, 2.95, s2, second)) {
-      row.add(first, s2 / (s2 - s1));
-      row.add(second, -s1 / (s2 - s1));
-      return RowKind::linear;
-    }
-  }
-  return fitted_pressure_row(allowed, p, row);
-}
-
 /// Geometry that the stencils are built on.
 struct StencilInput {
   Lattice lattice;
@@ -308,19 +290,18 @@ KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row
 
 /// Velocity rows and surface points of `count` immersed nodes; counts[0 .. row_kinds) gets the rows of each kind.
 /// Exact for velocities linear in space (quadratic along the normal: for those along straight normals too).
-inline void build_velocity_rows(const StencilInput& input, Reconstruction order, int count, const StencilViews& rows,
+inline void build_velocity_rows(const StencilInput& input, int count, const StencilViews& rows,
                                 const FootViews& feet, const Array<int>& counts) {
   const StencilInput in = input;
   const StencilViews out = rows;
   const FootViews foot_out = feet;
-  const bool quadratic = order == Reconstruction::quadratic;
   Kokkos::parallel_for(
       "corpuscle::immersed::velocity_rows", Policy(0, count), KOKKOS_LAMBDA(int n) {
         const int c = out.node(n);
         const ImmersedNode p = describe(in.lattice, in.surface, in.images, in.normals, in.band, c);
         const Allowed allowed{in.lattice, in.surface, in.band, in.nodes, true};
         Row row;
-        const RowKind kind = velocity_row(allowed, p, quadratic, row);
+        const RowKind kind = velocity_row(allowed, p, row);
         write_row(out, n, row, kind, counts, 0);
         const unsigned item = key_item(in.band.key(c)), triangles = static_cast<unsigned>(in.surface.triangles);
         const int t = static_cast<int>(item % triangles);
@@ -333,17 +314,16 @@ inline void build_velocity_rows(const StencilInput& input, Reconstruction order,
 
 /// Pressure rows of `count` immersed nodes (fluid nodes only, no surface value); counts[row_kinds .. 2 row_kinds).
 /// Exact for linear pressures. A row of kind surface_only is empty.
-inline void build_pressure_rows(const StencilInput& input, PressureExtension extension, int count,
+inline void build_pressure_rows(const StencilInput& input, int count,
                                 const StencilViews& rows, const Array<int>& counts) {
   const StencilInput in = input;
   const StencilViews out = rows;
-  const bool along_normal = extension == PressureExtension::normal;
   Kokkos::parallel_for(
       "corpuscle::immersed::pressure_rows", Policy(0, count), KOKKOS_LAMBDA(int n) {
         const ImmersedNode p = describe(in.lattice, in.surface, in.images, in.normals, in.band, out.node(n));
         const Allowed allowed{in.lattice, in.surface, in.band, in.nodes, false};
         Row row;
-        const RowKind kind = pressure_row(allowed, p, along_normal, row);
+        const RowKind kind = pressure_row(allowed, p, row);
         write_row(out, n, row, kind, counts, row_kinds);
       });
 }

@@ -8,22 +8,13 @@
 
 namespace corpuscle {
 
-/// Terms of the velocity fit, all anchored at the vertex: the gradient; with the square of the distance along the
-/// normal; with the square of the distance along the surface as well; all ten second-order terms less the constant.
-enum class TractionFit { gradient = 3, normal_square = 4, two_squares = 5, full_quadratic = 9 };
-
-struct TractionOptions {
-  TractionFit fit = TractionFit::full_quadratic;
-  bool immersed_nodes = true;     // let reconstructed velocities into the fit
-  bool immersed_pressure = true;  // and extended pressures into the pressure fit
-  bool ring = false;              // and the velocities of the vertex's neighbours on the surface
-  double radius = 2.5;            // in index-scaled distance; at most 2.5, so that three halo layers hold every point
-  double softening = 0.1;         // weights 1 / (r^2 + softening)
-};
+/// Of the fits: points up to this far in index-scaled distance, so that three halo layers hold every one, and weights
+/// 1 / (r^2 + softening).
+constexpr double fit_radius = 2.5, fit_softening = 0.1;
 
 /// How a vertex got its traction; counted for velocity and pressure.
 enum TractionFallback {
-  traction_fitted,    // the fit asked for
+  traction_fitted,    // to second order
   traction_gradient,  // gradient only, from all points of the box
   traction_normal,    // slope along the normal only
   traction_nothing,   // no fluid on this side: no viscous part
@@ -70,7 +61,7 @@ KOKKOS_INLINE_FUNCTION TractionVertex describe_vertex(const Lattice& lattice, co
 /// offset from the vertex, w the weight. `farthest` bounds |y|.
 template <class Use>
 KOKKOS_INLINE_FUNCTION void for_nodes_around(const StencilInput& in, const TractionVertex& t, double farthest,
-                                             double softening, const Use& use) {
+                                             const Use& use) {
   int lower[3], upper[3];
   for (int d = 0; d < 3; ++d) {
     lower[d] = static_cast<int>(std::ceil(t.xi[d] - 2.5));
@@ -88,23 +79,16 @@ KOKKOS_INLINE_FUNCTION void for_nodes_around(const StencilInput& in, const Tract
         const Vec3 y{dot(t.row[0], r), dot(t.row[1], r), dot(t.row[2], r)};
         const double r2 = dot(y, y);
         if (r2 > farthest * farthest || !own_side(in.lattice, in.surface, in.band, t.side, c)) continue;
-        use(c, y, r, 1 / (r2 + softening));
+        use(c, y, r, 1 / (r2 + fit_softening));
       }
     }
   }
 }
 
-/// Basis of the velocity fit: index-scaled offset, then the second-order terms.
+/// Basis of the velocity fit, anchored at the vertex: index-scaled offset, and with N = 9 the second-order terms.
 template <int N>
-KOKKOS_INLINE_FUNCTION void fit_basis(const TractionVertex& t, const Vec3& y, const Vec3& r, double (&phi)[N]) {
+KOKKOS_INLINE_FUNCTION void fit_basis(const Vec3& y, double (&phi)[N]) {
   phi[0] = y.x, phi[1] = y.y, phi[2] = y.z;
-  const double eta = dot(r, t.side.normal) / t.spacing;
-  if constexpr (N == 4 || N == 5) phi[3] = eta * eta;
-  if constexpr (N == 5) {
-    const Vec3 along = r - (eta * t.spacing) * t.side.normal;
-    const Vec3 z{dot(t.row[0], along), dot(t.row[1], along), dot(t.row[2], along)};
-    phi[4] = dot(z, z);
-  }
   if constexpr (N == 9) {
     phi[3] = y.x * y.x, phi[4] = y.y * y.y, phi[5] = y.z * y.z;
     phi[6] = y.x * y.y, phi[7] = y.y * y.z, phi[8] = y.z * y.x;
@@ -114,33 +98,20 @@ KOKKOS_INLINE_FUNCTION void fit_basis(const TractionVertex& t, const Vec3& y, co
 /// Gradient of each velocity component in index-scaled coordinates; false if the points do not carry the fit.
 template <int N>
 KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
-                                         const Vec3& v, const TractionOptions& options, double farthest,
-                                         Vec3 (&gradient)[3]) {
+                                         const Vec3& v, double farthest, Vec3 (&gradient)[3]) {
   NormalMatrix<N> normal;
   double right[3][N] = {};
   int points = 0;
-  const auto add = [&](const Vec3& y, const Vec3& r, const Vec3& du, double w) {
+  for_nodes_around(in, t, farthest, [&](int c, const Vec3& y, const Vec3&, double w) {
+    const Vec3 du = load(u, c) - v;
     double phi[N];
-    fit_basis(t, y, r, phi);
+    fit_basis(y, phi);
     normal.add(phi, w);
     for (int k = 0; k < N; ++k) {
       for (int d = 0; d < 3; ++d) right[d][k] += w * phi[k] * du[d];
     }
     ++points;
-  };
-  for_nodes_around(in, t, farthest, options.softening, [&](int c, const Vec3& y, const Vec3& r, double w) {
-    if (in.nodes.kind(c) != NodeKind::immersed || options.immersed_nodes) add(y, r, load(u, c) - v, w);
   });
-  if (points == 0) return false;
-  if (options.ring) {
-    const SurfaceSet& s = in.surface;
-    for (int e = s.ring_start(t.vertex); e < s.ring_start(t.vertex + 1); ++e) {
-      const int j = s.triangle(s.ring_triangle(e), (s.ring_corner(e) + 1) % 3);
-      const Vec3 r = load(s.x, j) - load(s.x, t.vertex);
-      const Vec3 y{dot(t.row[0], r), dot(t.row[1], r), dot(t.row[2], r)};
-      add(y, r, load(s.v, j) - v, 1 / (dot(y, y) + options.softening));
-    }
-  }
   if (points < N + 2 || !normal.factorise(N == 9 ? 1e-3 : 5e-3)) return false;
   for (int d = 0; d < 3; ++d) {
     normal.solve(right[d]);
@@ -151,10 +122,10 @@ KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Component
 
 /// Slope along the normal only. @returns false without a point.
 KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
-                                      const Vec3& v, const TractionOptions& options, Vec3 (&gradient)[3]) {
+                                      const Vec3& v, Vec3 (&gradient)[3]) {
   double square = 0;
   Vec3 sum;
-  for_nodes_around(in, t, 1e3, options.softening, [&](int c, const Vec3&, const Vec3& r, double w) {
+  for_nodes_around(in, t, 1e3, [&](int c, const Vec3&, const Vec3& r, double w) {
     if (in.nodes.kind(c) == NodeKind::immersed) return;
     const double eta = dot(r, t.side.normal);
     square += w * eta * eta;
@@ -166,16 +137,14 @@ KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<d
 }
 
 /// Gradient of the velocity in space, gradient[i][j] = du_i/dx_j, and how it was found.
-template <int N>
 KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Components<double>& u,
-                                             const TractionVertex& t, const Vec3& v, const TractionOptions& options,
-                                             Vec3 (&gradient)[3]) {
+                                             const TractionVertex& t, const Vec3& v, Vec3 (&gradient)[3]) {
   Vec3 scaled[3];
   int how = traction_fitted;
-  if (!fit_gradient<N>(in, u, t, v, options, options.radius, scaled)) {
+  if (!fit_gradient<9>(in, u, t, v, fit_radius, scaled)) {
     how = traction_gradient;
-    if (!fit_gradient<3>(in, u, t, v, options, 1e3, scaled)) {
-      return fit_slope(in, u, t, v, options, gradient) ? traction_normal : traction_nothing;
+    if (!fit_gradient<3>(in, u, t, v, 1e3, scaled)) {
+      return fit_slope(in, u, t, v, gradient) ? traction_normal : traction_nothing;
     }
   }
   for (int d = 0; d < 3; ++d) gradient[d] = scaled[d].x * t.row[0] + scaled[d].y * t.row[1] + scaled[d].z * t.row[2];
@@ -190,13 +159,13 @@ struct PressureFit {
 
 /// Linear fit of the pressure at the vertex from points up to `farthest`. @returns whether the points carry it
 KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
-                                         double farthest, double softening, bool immersed, PressureFit& fit) {
+                                         double farthest, PressureFit& fit) {
   NormalMatrix<4> normal;
   double right[4] = {0, 0, 0, 0}, level = 0;
   fit.points = 0;
-  for_nodes_around(in, t, farthest, softening, [&](int c, const Vec3& y, const Vec3&, double w) {
+  for_nodes_around(in, t, farthest, [&](int c, const Vec3& y, const Vec3&, double w) {
     const NodeKind kind = in.nodes.kind(c);
-    if (kind != NodeKind::fluid && !(immersed && kind == NodeKind::immersed)) return;
+    if (kind != NodeKind::fluid && kind != NodeKind::immersed) return;
     if (fit.points == 0) level = p(c);
     const double phi[4] = {1, y.x, y.y, y.z};
     normal.add(phi, w);
@@ -211,15 +180,14 @@ KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<dou
 }
 
 KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
-                                            const TractionOptions& options, double& value) {
+                                            double& value) {
   PressureFit fit;
-  const double softening = options.softening;
   int how = pressure_fitted;
-  if (!fit_pressure(in, p, t, options.radius, softening, options.immersed_pressure, fit)) {
+  if (!fit_pressure(in, p, t, fit_radius, fit)) {
     // Where the surface runs along a grid plane, a single layer of fluid nodes may be in reach: the layer between it and
     // the surface, to which the pressure was extended, carries the slope.
     how = pressure_wide;
-    if (!fit_pressure(in, p, t, 1e3, softening, true, fit)) {
+    if (!fit_pressure(in, p, t, 1e3, fit)) {
       value = fit.points > 0 ? fit.mean : no_pressure;
       return fit.points > 0 ? pressure_average : pressure_nothing;
     }
@@ -237,9 +205,10 @@ struct TractionInput {
   Vec3 origin;             // where the imposed gradient's pressure is zero, um
 };
 
-template <int N>
-void vertex_tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
-                      const TractionOptions& options, const SurfaceStress& out, const Array<int>& counts) {
+/// Stress of the fluid at the owned vertices, zero at those of other ranks; counts as TractionFallback.
+inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
+                      const SurfaceStress& out, const Array<int>& counts) {
+  Kokkos::deep_copy(Exec(), counts, 0);
   const StencilInput in = input;
   const PlaceViews where = places;
   const TractionInput f = fields;
@@ -252,33 +221,17 @@ void vertex_tractions(const StencilInput& input, const PlaceViews& places, const
           const TractionVertex t = describe_vertex(in.lattice, in.surface, in.images, where, v);
           const Vec3 n = t.side.normal;
           Vec3 gradient[3];
-          const int how = velocity_gradient<N>(in, f.u, t, load(in.surface.v, v), options, gradient);
+          const int how = velocity_gradient(in, f.u, t, load(in.surface.v, v), gradient);
           Kokkos::atomic_fetch_add(&counts(how), 1);
           if (how != traction_nothing) {
             const Vec3 transposed = n.x * gradient[0] + n.y * gradient[1] + n.z * gradient[2];
             drag = f.viscosity * (Vec3{dot(gradient[0], n), dot(gradient[1], n), dot(gradient[2], n)} + transposed);
           }
-          Kokkos::atomic_fetch_add(&counts(surface_pressure(in, f.p, t, options, p)), 1);
+          Kokkos::atomic_fetch_add(&counts(surface_pressure(in, f.p, t, p)), 1);
           if (has_pressure(p)) p += dot(f.pressure_gradient, load(in.surface.x, v) - f.origin);
         }
         to.set(v, p, drag);
       });
-}
-
-/// Stress of the fluid at the owned vertices, zero at those of other ranks; counts as TractionFallback.
-inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
-                      const TractionOptions& options, const SurfaceStress& out, const Array<int>& counts) {
-  Kokkos::deep_copy(Exec(), counts, 0);
-  switch (options.fit) {
-    case TractionFit::gradient:
-      return vertex_tractions<3>(input, places, fields, options, out, counts);
-    case TractionFit::normal_square:
-      return vertex_tractions<4>(input, places, fields, options, out, counts);
-    case TractionFit::two_squares:
-      return vertex_tractions<5>(input, places, fields, options, out, counts);
-    case TractionFit::full_quadratic:
-      return vertex_tractions<9>(input, places, fields, options, out, counts);
-  }
 }
 
 struct Slip {
@@ -287,8 +240,7 @@ struct Slip {
 
 /// Difference between the surface's velocity and the fluid's, extrapolated to the owned vertices by a linear fit that
 /// is not anchored there. Vertices without enough points are left out.
-inline Slip surface_slip(const StencilInput& input, const PlaceViews& places, const Components<double>& u,
-                         const TractionOptions& options) {
+inline Slip surface_slip(const StencilInput& input, const PlaceViews& places, const Components<double>& u) {
   const StencilInput in = input;
   const PlaceViews where = places;
   const auto field = u;
@@ -301,7 +253,7 @@ inline Slip surface_slip(const StencilInput& input, const PlaceViews& places, co
         NormalMatrix<5> normal;
         double right[3][5] = {};
         int points = 0;
-        for_nodes_around(in, t, options.radius, options.softening, [&](int c, const Vec3& y, const Vec3& r, double w) {
+        for_nodes_around(in, t, fit_radius, [&](int c, const Vec3& y, const Vec3& r, double w) {
           if (in.nodes.kind(c) == NodeKind::immersed) return;
           const double eta = dot(r, t.side.normal) / t.spacing, phi[5] = {1, y.x, y.y, y.z, eta * eta};
           normal.add(phi, w);

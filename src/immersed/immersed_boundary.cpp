@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "immersed/surface.hpp"
 #include "immersed/uncovered.hpp"
 
 namespace corpuscle {
@@ -73,14 +74,9 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
       throw InputError(fmt::format("immersed boundary: index direction {} is periodic but its period is zero", d));
     }
   }
-  if (options.traction.radius > 2.5) {
-    throw InputError(fmt::format("traction fit: radius {} spacings; allowed up to 2.5, which three halo layers hold",
-                                 options.traction.radius));
-  }
   images_ = make_images(grid.index, options.frame.period);
   find_bounds(lattice_, locate_);
   std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
-  locate_.band_links = options.band_links;
 
   first_node_ = load(to_host(grid.x), grid.index.cell(0, 0, 0));
 
@@ -302,8 +298,8 @@ NodeBox ImmersedBoundary::resolve_enclosed(const NodeBox& box) {
 
 void ImmersedBoundary::build_stencils() {
   Kokkos::deep_copy(Exec(), row_counts_, 0);
-  build_velocity_rows(input(), options_.reconstruction, counts_.immersed, velocity_, feet_, row_counts_);
-  build_pressure_rows(input(), options_.pressure_extension, counts_.immersed, pressure_, row_counts_);
+  build_velocity_rows(input(), counts_.immersed, velocity_, feet_, row_counts_);
+  build_pressure_rows(input(), counts_.immersed, pressure_, row_counts_);
   const auto& counts = row_counts_host_.read();
   for (int k = 0; k < row_kinds; ++k) {
     counts_.velocity_rows[k] = counts(k);
@@ -325,7 +321,7 @@ void ImmersedBoundary::extend_pressure(const Array<double>& p) const {
 }
 
 const SurfaceStress& ImmersedBoundary::find_stress(const TractionInput& fields) {
-  tractions(input(), places_, fields, options_.traction, stress_, traction_counts_);
+  tractions(input(), places_, fields, stress_, traction_counts_);
   return stress_;
 }
 
@@ -335,7 +331,7 @@ std::vector<int> ImmersedBoundary::traction_fallbacks() const {
 }
 
 Slip ImmersedBoundary::slip(const Components<double>& u) const {
-  return surface_slip(input(), places_, u, options_.traction);
+  return surface_slip(input(), places_, u);
 }
 
 std::vector<char> ImmersedBoundary::owned_vertices() const {

@@ -16,16 +16,12 @@
 namespace corpuscle {
 
 struct ImmersedOptions {
-  std::array<bool, 6> wall{};    // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
-  PeriodicFrame frame;           // of the periodic directions
+  std::array<bool, 6> wall{};  // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
+  PeriodicFrame frame;         // of the periodic directions
   /// Where nodes of others lie beside this block's (other ranks', or its own at the other end of a periodic direction): the
   /// sum over all ranks, and the exchange of halos.
   std::function<long(long)> sum;
   std::function<void(const Array<std::int8_t>&)> exchange;
-  double band_links = 1.1;       // half-width of the search band in link lengths
-  Reconstruction reconstruction = Reconstruction::quadratic;
-  PressureExtension pressure_extension = PressureExtension::least_squares;
-  TractionOptions traction;
 };
 
 /// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
