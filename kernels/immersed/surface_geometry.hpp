@@ -3,7 +3,7 @@
 
 #include "common/types.hpp"
 #include "common/vec3.hpp"
-#include "immersed/surface.hpp"
+#include "immersed/surface_views.hpp"
 
 namespace corpuscle {
 

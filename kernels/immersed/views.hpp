@@ -2,7 +2,7 @@
 #pragma once
 
 #include "immersed/lattice.hpp"
-#include "immersed/surface.hpp"
+#include "immersed/surface_views.hpp"
 
 namespace corpuscle {
 

@@ -1,7 +1,7 @@
 // The arrays of all membranes, as kernels see them.
 #pragma once
 
-#include "immersed/surface.hpp"
+#include "immersed/surface_views.hpp"
 #include "membrane/sections.hpp"
 #include "membrane/triangle_forces.hpp"
 

@@ -3,6 +3,7 @@
 #include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "grid/metrics.hpp"
+#include "immersed/surface.hpp"
 #include "immersed/surface_motion.hpp"
 
 #include <fmt/format.h>

@@ -1,34 +1,13 @@
-// The closed triangulated surfaces immersed in the fluid, all bodies in one set of arrays. Membranes and rigid bodies
-// both appear to the fluid as this.
+// Making the set of immersed surfaces from meshes, and meshes and names from it.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "common/types.hpp"
+#include "immersed/surface_views.hpp"
 #include "membrane/mesh.hpp"
 
 namespace corpuscle {
-
-/// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank
-/// holds all surfaces.
-struct SurfaceSet {
-  int bodies = 0, vertices = 0, triangles = 0;
-  int cells = 0;              // the first bodies are membranes, the others rigid
-  Components<double> x;       // [vertex, 3] um
-  Components<double> v;       // [vertex, 3] um/us
-  Components<double> normal;  // [vertex, 3] outward unit normal, area weighted
-  Array<double> area;         // [vertex] a third of the areas of its triangles, um2
-  Table<int> triangle;        // [triangle, 3] vertex numbers
-  Table<int> neighbour;       // [triangle, 3] triangle across the edge opposite corner 0, 1, 2
-  Array<int> vertex_body;     // [vertex] body number
-  Array<int> triangle_body;   // [triangle]
-  Array<int> first_vertex;    // [bodies + 1]
-  Array<int> first_triangle;  // [bodies + 1]
-  Array<int> ring_start;      // [vertices + 1] into ring_triangle
-  Array<int> ring_triangle;   // triangles around each vertex, in order
-  Array<int> ring_corner;     // [as ring_triangle] which corner of that triangle the vertex is: 0, 1, 2
-};
 
 /// All arrays allocated and filled: positions as given, velocities zero, normals and areas up to date.
 /// @throws InputError  if a mesh is not a closed surface

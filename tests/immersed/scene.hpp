@@ -8,6 +8,7 @@
 #include <random>
 
 #include "immersed/immersed_boundary.hpp"
+#include "immersed/surface.hpp"
 #include "immersed/surface_geometry.hpp"
 
 namespace scene {
