@@ -15,19 +15,20 @@ struct CellColumn {
     upper = 9,     // 3, um
     area = 12,     // um2
     volume = 13,   // um3
-    springs = 14,  // energies, fJ
+    springs = 14,  // energies, fJ: in-plane, ...
     bending = 15,
     global_area = 16,
     local_area = 17,
     global_volume = 18,
-    stretch = 19,  // largest length over l_m of any link
+    stretch = 19,  // largest strain of any triangle, as its law has it: with springs, length over l_m of a link
     count = 20
   };
 };
 
 /// Per-triangle sums behind the columns: energies and the first moment of the volume.
+template <class Law>
 KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int type_triangle, const CellLaw& law,
-                                             const Vec3& origin) {
+                                             const Law& in_plane, const Vec3& origin) {
   const SurfaceSet& s = m.surface;
   const Components<double>& x = s.x;
   const TriangleRest rest = m.rest(type_triangle);
@@ -35,12 +36,12 @@ KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int 
   const double area = m.triangle_geometry(t, 3);
   Vec3 corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = load(x, s.triangle(t, k)) - origin;
+  const TriangleShape shape = triangle_shape(corner, normal, area);
   Sums<6> sum;
+  sum[0] = in_plane.energy(shape, rest);
   for (int k = 0; k < 3; ++k) {
-    const Vec3 side = corner[(k + 2) % 3] - corner[(k + 1) % 3];
-    const double length = norm(side);
-    const Dihedral angle = dihedral(normal, load(m.triangle_geometry, s.neighbour(t, k)), side * (1 / length));
-    sum[0] += 0.5 * wlc_energy(length, rest.length[k], law.spring);
+    const Dihedral angle =
+        dihedral(normal, load(m.triangle_geometry, s.neighbour(t, k)), shape.side[k] * (1 / shape.length[k]));
     sum[1] += 0.5 * bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
   }
   sum[2] = 0.5 * law.local_area * (area - rest.area) * (area - rest.area) / rest.area;
@@ -50,8 +51,10 @@ KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int 
   return sum;
 }
 
+/// @param laws   [type]
 /// @param table  [cells, CellColumn::count]
-inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
+template <class Law>
+void measure_cells(const MembraneViews& m, const Array<Law>& laws, const Table<double>& table) {
   measure_membranes(m, m.surface.x);
   using Column = CellColumn;
   const auto x = m.surface.x, v = m.surface.v;
@@ -60,6 +63,7 @@ inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
       KOKKOS_LAMBDA(const SectionTeam& team) {
         const int cell = team.league_rank(), type = m.type(cell);
         const CellLaw law = m.law(type);
+        const Law in_plane = laws(type);
         const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);
         const int t0 = m.surface.first_triangle(cell), t1 = m.surface.first_triangle(cell + 1);
         const int shift = m.type_first_triangle(type) - t0;
@@ -67,7 +71,7 @@ inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
         Sums<6> total;
         Kokkos::parallel_reduce(
             Kokkos::TeamThreadRange(team, t0, t1),
-            [&](int t, Sums<6>& sum) { sum += triangle_sums(m, t, t + shift, law, origin); }, total);
+            [&](int t, Sums<6>& sum) { sum += triangle_sums(m, t, t + shift, law, in_plane, origin); }, total);
         Sums<3> momentum;
         Kokkos::parallel_reduce(
             Kokkos::TeamThreadRange(team, first, last),
@@ -79,12 +83,11 @@ inline void measure_cells(const MembraneViews& m, const Table<double>& table) {
         Kokkos::parallel_reduce(
             Kokkos::TeamThreadRange(team, t0, t1),
             [&](int t, double& largest) {
-              for (int k = 0; k < 3; ++k) {
-                const Vec3 side =
-                    load(x, m.surface.triangle(t, (k + 2) % 3)) - load(x, m.surface.triangle(t, (k + 1) % 3));
-                const double ratio = norm(side) / m.rest_length(t + shift, k) * SpringLaw::x0;
-                largest = larger(largest, ratio);
-              }
+              Vec3 corner[3];
+              for (int k = 0; k < 3; ++k) corner[k] = load(x, m.surface.triangle(t, k));
+              const TriangleShape shape = triangle_shape(corner, load(m.triangle_geometry, t), m.triangle_geometry(t, 3));
+              const double strain = in_plane.strain(shape, m.rest(t + shift));
+              largest = larger(largest, strain);
             },
             Largest(stretch));
         Sums<3> lower, upper;

@@ -35,15 +35,18 @@ inline void measure_membranes(const MembraneViews& m, const Components<double>& 
       });
 }
 
-/// Forces of each triangle on its corners; measure_membranes must have run at the same x. Marks overstretched cells in
+/// Forces of each triangle on its corners; measure_membranes must have run at the same x. Marks overstrained cells in
 /// m.status.
-inline void evaluate_triangles(const MembraneViews& m, const Components<double>& x) {
+/// @param laws  [type]
+template <class Law>
+void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Components<double>& x) {
   for_sections(
       "corpuscle::membrane::triangle_forces", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
         const SurfaceSet& surface = m.surface;
         const int type = m.type(cell), first = surface.first_triangle(cell);
         const int shift = m.type_first_triangle(type) - first;
         const CellLaw law = m.law(type);
+        const Law in_plane = laws(type);
         const GlobalLoads loads = global_loads(section_total(m.totals, cell, 0), section_total(m.totals, cell, 1), law);
         Kokkos::parallel_for(section_range(team, first, surface.first_triangle(cell + 1), section), [&](int t) {
           TriangleState state;
@@ -54,11 +57,11 @@ inline void evaluate_triangles(const MembraneViews& m, const Components<double>&
           state.normal = load(m.triangle_geometry, t);
           state.area = m.triangle_geometry(t, 3);
           Vec3 force[3];
-          const double stretch = triangle_forces(state, m.rest(t + shift), law, loads, force);
+          const double strain = triangle_forces(state, m.rest(t + shift), law, in_plane, loads, force);
           for (int k = 0; k < 3; ++k) {
             for (int d = 0; d < 3; ++d) m.corner_force(t, 3 * k + d) = force[k][d];
           }
-          if (!(stretch < SpringLaw::x_limit)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
+          if (!(strain < Law::limit)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
         });
       });
 }
@@ -87,10 +90,8 @@ KOKKOS_INLINE_FUNCTION Vec3 gather_area(const MembraneViews& m, int i, double& a
   return gradient;
 }
 
-/// Internal forces at positions x, into force [vertex, 3] nN.
-inline void membrane_forces(const MembraneViews& m, const Components<double>& x, const Components<double>& force) {
-  measure_membranes(m, x);
-  evaluate_triangles(m, x);
+/// Sums of the triangles' forces, into force [vertex, 3] nN.
+inline void gather_forces(const MembraneViews& m, const Components<double>& force) {
   Kokkos::parallel_for(
       "corpuscle::membrane::gather_forces", Policy(0, m.vertices),
       KOKKOS_LAMBDA(int i) { store(force, i, gather_force(m, i)); });

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "common/extremes.hpp"
-#include "membrane/forces.hpp"
+#include "membrane/elasticity.hpp"
 
 namespace corpuscle {
 
@@ -118,11 +118,11 @@ inline double largest_force(const MembraneViews& m, const RelaxationViews& w) {
 }
 
 /// Run `count` iterations, numbered on from `first`.
-inline void relax(const MembraneViews& m, const RelaxationViews& w, const RelaxationLimits& limits, int first,
-                  int count) {
+inline void relax(const MembraneViews& m, const Elasticity& elasticity, const RelaxationViews& w,
+                  const RelaxationLimits& limits, int first, int count) {
   for (int i = first; i < first + count; ++i) {
     measure_membranes(m, m.surface.x);
-    evaluate_triangles(m, m.surface.x);
+    elasticity.evaluate_triangles(m, m.surface.x);
     gather_relaxation(m, w);
     move_relaxation(m, w, limits, i);
   }

@@ -1,41 +1,49 @@
 // The spectrin links: worm-like chain attraction and power-law repulsion (Equations 5 and 6), for one edge.
 #pragma once
 
-#include "common/vec3.hpp"
+#include "membrane/spring_network.hpp"
 
 namespace corpuscle {
 
 /// A link is its rest length l0 alone: the contour length is l_m = 2.2 l0, the persistence length p is such that p l0
 /// is the same for all links (Equation 14, which keeps the shear modulus), and k_p makes the force vanish at l0.
-struct SpringLaw {
-  static constexpr double x0 = 1 / 2.2;    // l0 / l_m
-  static constexpr double x_limit = 0.99;  // beyond this share of l_m the force is not evaluated: the step is refused
+struct WlcPowSpring {
+  static constexpr double x0 = 1 / 2.2;  // l0 / l_m
+  static constexpr double limit = 0.99;  // beyond this share of l_m the force is not evaluated: the step is refused
 
   double stiffness = 0;  // kT / (p l0), nN/um
+
+  KOKKOS_INLINE_FUNCTION double force(double length, double rest_length) const;
+  KOKKOS_INLINE_FUNCTION double energy(double length, double rest_length) const;
+  /// Length over l_m.
+  KOKKOS_INLINE_FUNCTION static double strain(double length, double rest_length) { return length / rest_length * x0; }
 };
+
+/// The law "wlc-pow".
+using WlcPow = SpringNetwork<WlcPowSpring>;
 
 /// The worm-like chain's force over kT / p (Equation 5, differentiated).
 KOKKOS_INLINE_FUNCTION constexpr double wlc_shape(double x) { return 0.25 / ((1 - x) * (1 - x)) - 0.25 + x; }
 
 /// Attraction along the link, nN: kT/p wlc_shape(x) - k_p / l^2, with k_p = kT/p wlc_shape(x0) l0^2.
-/// Lengths beyond x_limit l_m are taken as x_limit l_m.
-KOKKOS_INLINE_FUNCTION double wlc_force(double length, double rest_length, const SpringLaw& law) {
+/// Lengths beyond `limit` l_m are taken as `limit` l_m.
+KOKKOS_INLINE_FUNCTION double WlcPowSpring::force(double length, double rest_length) const {
   const double ratio = length / rest_length;
-  const double x = ratio * SpringLaw::x0 < SpringLaw::x_limit ? ratio * SpringLaw::x0 : SpringLaw::x_limit;
-  return law.stiffness * rest_length * (wlc_shape(x) - wlc_shape(SpringLaw::x0) / (ratio * ratio));
+  const double x = ratio * x0 < limit ? ratio * x0 : limit;
+  return stiffness * rest_length * (wlc_shape(x) - wlc_shape(x0) / (ratio * ratio));
 }
 
 /// U_WLC + U_POW of the link, fJ (Equations 5 and 6 with m = 2).
-KOKKOS_INLINE_FUNCTION double wlc_energy(double length, double rest_length, const SpringLaw& law) {
-  const double x = length / rest_length * SpringLaw::x0;
-  const double wlc = rest_length / (4 * SpringLaw::x0) * (3 - 2 * x) * x * x / (1 - x);
-  return law.stiffness * rest_length * (wlc + wlc_shape(SpringLaw::x0) * rest_length * rest_length / length);
+KOKKOS_INLINE_FUNCTION double WlcPowSpring::energy(double length, double rest_length) const {
+  const double x = length / rest_length * x0;
+  const double wlc = rest_length / (4 * x0) * (3 - 2 * x) * x * x / (1 - x);
+  return stiffness * rest_length * (wlc + wlc_shape(x0) * rest_length * rest_length / length);
 }
 
-/// Linear shear modulus of a regular network of such links over law.stiffness (Fedosov, Caswell & Karniadakis 2010,
+/// Linear shear modulus of a regular network of such links over the stiffness (Fedosov, Caswell & Karniadakis 2010,
 /// with the terms written in x0; kT/(p l0) and k_p/l0^3 are both proportional to the stiffness).
 KOKKOS_INLINE_FUNCTION constexpr double shear_modulus_over_stiffness() {
-  constexpr double x = SpringLaw::x0, y = 1 - x;
+  constexpr double x = WlcPowSpring::x0, y = 1 - x;
   constexpr double attraction = x / (2 * y * y * y) - 1 / (4 * y * y) + 0.25;
   return 1.7320508075688772 / 4 * (attraction + 3 * wlc_shape(x));
 }

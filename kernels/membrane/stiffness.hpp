@@ -1,7 +1,7 @@
 // The largest eigenvalue of each membrane's Hessian, by power iteration on finite differences of the forces.
 #pragma once
 
-#include "membrane/forces.hpp"
+#include "membrane/elasticity.hpp"
 
 namespace corpuscle {
 
@@ -62,16 +62,16 @@ inline void difference_forces(const MembraneViews& m, const StiffnessViews& w, d
 }
 
 /// Largest eigenvalue for each cell. @param eigenvalue  [cells] nN/um
-inline void largest_stiffness(const MembraneViews& m, const StiffnessViews& w, int iterations,
-                              const Array<double>& eigenvalue) {
+inline void largest_stiffness(const MembraneViews& m, const Elasticity& elasticity, const StiffnessViews& w,
+                              int iterations, const Array<double>& eigenvalue) {
   // Small against an edge, large against the rounding of positions: the difference is good to about 1e-6.
   constexpr double distance = 1e-4;
   start_mode(m, w);
   for (int i = 0; i < iterations; ++i) {
     displace(m, w, distance);
-    membrane_forces(m, w.probe, w.force_ahead);
+    elasticity.membrane_forces(m, w.probe, w.force_ahead);
     displace(m, w, -distance);
-    membrane_forces(m, w.probe, w.force_behind);
+    elasticity.membrane_forces(m, w.probe, w.force_behind);
     difference_forces(m, w, distance);
   }
   Kokkos::parallel_for(

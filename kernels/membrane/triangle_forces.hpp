@@ -1,13 +1,12 @@
 // Geometry and forces of one triangle of the membrane: plain functions of its corners and its neighbours' normals.
 #pragma once
 
-#include "membrane/spring_law.hpp"
+#include "membrane/triangle_shape.hpp"
 
 namespace corpuscle {
 
-/// Elastic constants of a cell type and its totals at rest.
+/// Constants of a cell type, but for those of its in-plane law, and its totals at rest.
 struct CellLaw {
-  SpringLaw spring;
   double bending = 0;             // k_b, fJ
   double area = 0;                // k_a, nN/um
   double local_area = 0;          // k_d, nN/um
@@ -17,13 +16,6 @@ struct CellLaw {
   double vertex_mass = 0;         // pg
   double central_damping = 0;     // gamma_C of Equation 10, nN us/um
   double tangential_damping = 0;  // gamma_T
-};
-
-/// Reference state of one triangle: of the side opposite each corner, the rest length and the rest angle.
-struct TriangleRest {
-  double length[3];
-  double cos_angle[3], sin_angle[3];
-  double area;
 };
 
 struct Dihedral {
@@ -63,40 +55,36 @@ KOKKOS_INLINE_FUNCTION GlobalLoads global_loads(double area, double volume, cons
           -law.volume * (volume - law.rest_volume) / law.rest_volume};
 }
 
-/// Forces on the three corners, nN: half of each side's spring, this triangle's part of the bending of each side, and
-/// the area and volume terms (Equations 3 to 8). Each side's other half comes from the triangle across it.
-/// @return the largest of length / l_m over the sides (a length that is not a number gives infinity)
+/// Forces on the three corners, nN: the in-plane law's, this triangle's part of the bending of each side, and the area and
+/// volume terms (Equations 3 to 8).
+/// @param in_plane  see triangle_shape.hpp
+/// @return its strain
+template <class Law>
 KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law,
-                                              const GlobalLoads& loads, Vec3 force[3]) {
-  Vec3 side[3];
-  for (int k = 0; k < 3; ++k) side[k] = s.corner[(k + 2) % 3] - s.corner[(k + 1) % 3];
+                                              const Law& in_plane, const GlobalLoads& loads, Vec3 (&force)[3]) {
+  const TriangleShape shape = triangle_shape(s.corner, s.normal, s.area);
   const double tension = loads.tension + law.local_area * (s.area - rest.area) / rest.area;
   const double pressure = loads.pressure * s.area / 3;
   double along_normal[3] = {pressure, pressure, pressure};
   // dA/dx of a corner is n x (opposite side) / 2.
-  for (int k = 0; k < 3; ++k) force[k] = (-0.5 * tension) * cross(s.normal, side[k]);
+  for (int k = 0; k < 3; ++k) force[k] = (-0.5 * tension) * cross(s.normal, shape.side[k]);
   const double half_over_area = 0.5 / s.area;
-  double largest = 0;
+  const double strain = in_plane.add_forces(shape, rest, force);
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
-    const double length = norm(side[k]), inverse = 1 / length;
-    const double x = length / rest.length[k] * SpringLaw::x0;
-    largest = x < 1e300 ? (x > largest ? x : largest) : 1e300;
-    const Vec3 pull = (0.5 * wlc_force(length, rest.length[k], law.spring) * inverse) * side[k];
-    force[a] += pull;
-    force[b] -= pull;
+    const double length = shape.length[k], inverse = 1 / length;
     // The angle falls by 1/h when corner k rises by 1 along the normal (h its height over the side); the two ends share
     // the opposite change by the foot of that height, so that the part exerts no net force or torque.
-    const Dihedral angle = dihedral(s.normal, s.other_normal[k], side[k] * inverse);
+    const Dihedral angle = dihedral(s.normal, s.other_normal[k], shape.side[k] * inverse);
     const double moment = bending_moment(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
     const double per_height = moment * length * half_over_area;
-    const double foot = -dot(side[b], side[k]) * inverse * inverse;
+    const double foot = -dot(shape.side[b], shape.side[k]) * inverse * inverse;
     along_normal[k] += per_height;
     along_normal[a] -= (1 - foot) * per_height;
     along_normal[b] -= foot * per_height;
   }
   for (int k = 0; k < 3; ++k) force[k] += along_normal[k] * s.normal;
-  return largest;
+  return strain;
 }
 
 }  // namespace corpuscle

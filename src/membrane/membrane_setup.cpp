@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/error.hpp"
+
 namespace corpuscle {
 
 namespace {
@@ -69,6 +71,22 @@ MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<C
   m.force = Components<double>(label("force_vertex"), m.vertices, 3);
   m.status = Array<int>("corpuscle::membrane::status", 1);
   return m;
+}
+
+std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types) {
+  const MembraneLaw any = types.empty() ? MembraneLaw() : types[0].in_plane;
+  return std::visit(
+      [&](const auto& first) -> std::unique_ptr<Elasticity> {
+        using Law = std::decay_t<decltype(first)>;
+        std::vector<Law> laws;
+        for (const CellReference& type : types) {
+          const Law* law = std::get_if<Law>(&type.in_plane);
+          if (!law) throw InputError("cells: all cells of a scene must have the same membrane law");
+          laws.push_back(*law);
+        }
+        return std::make_unique<ElasticityOf<Law>>(to_device("in_plane_law_type", laws));
+      },
+      any);
 }
 
 MotionViews make_motion_views(const MembraneViews& m) {

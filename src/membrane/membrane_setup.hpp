@@ -1,6 +1,7 @@
 // Allocation and filling of the membranes' device arrays.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "membrane/membrane_views.hpp"
@@ -14,6 +15,10 @@ namespace corpuscle {
 /// @param type_of_cell  [cell] index into types
 MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
                                   const std::vector<int>& type_of_cell);
+
+/// The kernels of the types' in-plane law, of which all must be of one kind.
+/// @throws InputError  if they are not
+std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types);
 
 MotionViews make_motion_views(const MembraneViews& membranes);
 

@@ -19,10 +19,10 @@ MembraneViscosity::MembraneViscosity(const MembraneViews& m, bool tangential) : 
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
 }
 
-void MembraneViscosity::force(const MembraneViews& m, const Components<double>& v,
+void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
                               const Components<double>& force) const {
   measure_membranes(m, m.surface.x);
-  evaluate_triangles(m, m.surface.x);
+  elasticity.evaluate_triangles(m, m.surface.x);
   if (tangential_) {
     assemble_viscous<FullDamping>(m, views_, NoLoad{}, 1);
     dissipative_force<FullDamping>(m, v, views_.along, force);

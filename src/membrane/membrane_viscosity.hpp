@@ -1,6 +1,7 @@
 // Which form of membrane viscosity the cells need, decided once at set-up.
 #pragma once
 
+#include "membrane/elasticity.hpp"
 #include "membrane/viscosity.hpp"
 
 namespace corpuscle {
@@ -19,7 +20,8 @@ class MembraneViscosity {
   }
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
-  void force(const MembraneViews& m, const Components<double>& v, const Components<double>& force) const;
+  void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
+             const Components<double>& force) const;
 
   /// Power that it takes from the membranes at their present velocities, nW.
   double dissipation(const MembraneViews& m) const;

@@ -7,7 +7,6 @@
 
 #include "core/error.hpp"
 #include "membrane/copies.hpp"
-#include "membrane/diagnostics.hpp"
 #include "membrane/membrane_setup.hpp"
 #include "membrane/membrane_viscosity.hpp"
 #include "membrane/stiffness.hpp"
@@ -51,6 +50,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
   views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
   views_.surface.cells = views_.cells;
+  elasticity_ = make_elasticity(types);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   status_host_ = HostCopy(views_.status);
@@ -65,7 +65,7 @@ void Membranes::estimate_stiffness() {
   if (views_.cells == 0) return;
   const StiffnessViews work = make_stiffness_views(views_);
   const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
-  largest_stiffness(views_, work, power_iterations, eigenvalue);
+  largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue);
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), eigenvalue);
   stiffness_.assign(host.data(), host.data() + views_.cells);
   for (int c = 0; c < views_.cells; ++c) {
@@ -107,7 +107,7 @@ int Membranes::substeps(double dt_us, double beta) const {
 void Membranes::compute_forces() {
   if (views_.cells == 0) return;
   Kokkos::deep_copy(views_.status, 0);
-  membrane_forces(views_, views_.surface.x, views_.force);
+  elasticity_->membrane_forces(views_, views_.surface.x, views_.force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
@@ -115,7 +115,7 @@ template <class Load>
 void Membranes::take_substeps(int count, double dt, const Load& load) {
   for (int s = 0; s < count; ++s) {
     measure_membranes(views_, views_.surface.x);
-    evaluate_triangles(views_, views_.surface.x);
+    elasticity_->evaluate_triangles(views_, views_.surface.x);
     if (viscosity_) {
       viscosity_->predict_velocity(views_, motion_, load, dt);
     } else {
@@ -217,7 +217,7 @@ std::vector<CellDiagnostics> Membranes::diagnostics() {
   if (views_.cells == 0) return {};
   using Column = CellColumn;
   const Table<double> table(uninitialised("corpuscle::membrane::diagnostics_cell"), views_.cells, Column::count);
-  measure_cells(views_, table);
+  elasticity_->measure_cells(views_, table);
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
   std::vector<CellDiagnostics> all(views_.cells);
   for (int c = 0; c < views_.cells; ++c) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "immersed/surface.hpp"
+#include "membrane/elasticity.hpp"
 #include "membrane/membrane_views.hpp"
 #include "membrane/motion.hpp"
 #include "membrane/reference.hpp"
@@ -20,7 +21,7 @@ struct CellDiagnostics {
   double area_um2 = 0, volume_um3 = 0;
   double rest_area_um2 = 0, rest_volume_um3 = 0;  // A0, V0
   double springs_fJ = 0, bending_fJ = 0, global_area_fJ = 0, local_area_fJ = 0, volume_fJ = 0;
-  double stretch = 0;  // largest length over contour length of any link; breaks at 1
+  double stretch = 0;  // largest strain of any triangle; with springs, length over contour length of a link: breaks at 1
 
   double energy_fJ() const { return springs_fJ + bending_fJ + global_area_fJ + local_area_fJ + volume_fJ; }
   Triple extent_um() const { return {upper_um[0] - lower_um[0], upper_um[1] - lower_um[1], upper_um[2] - lower_um[2]}; }
@@ -42,6 +43,8 @@ class Membranes {
   SurfaceSet& surfaces() { return views_.surface; }
   const SurfaceSet& surfaces() const { return views_.surface; }
   const MembraneViews& views() const { return views_; }
+  /// Of the cells' in-plane law.
+  const Elasticity& elasticity() const { return *elasticity_; }
   int cells() const { return views_.cells; }
   int vertices() const { return views_.vertices; }
 
@@ -110,6 +113,7 @@ class Membranes {
   [[noreturn]] void explain(int cell, double dt);
 
   MembraneViews views_;
+  std::unique_ptr<Elasticity> elasticity_;
   MotionViews motion_;
   HostCopy<Array<int>> status_host_;
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance

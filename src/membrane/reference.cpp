@@ -36,7 +36,6 @@ CellLaw make_law(const CellSettings& c) {
   require(c.local_area_modulus_uN_per_m > 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m,
           "must be positive: without it triangles can collapse and the solution gets stuck; the model's value is 4.82");
   CellLaw law;
-  law.spring.stiffness = c.shear_modulus_uN_per_m * units::uN_per_m / shear_modulus_over_stiffness();
   law.bending = 2 / std::sqrt(3.0) * c.bending_modulus_fJ;
   law.area = c.area_modulus_uN_per_m * units::uN_per_m;
   law.local_area = c.local_area_modulus_uN_per_m * units::uN_per_m;
@@ -48,6 +47,10 @@ CellLaw make_law(const CellSettings& c) {
     law.central_damping = 4 * eta / (13 * std::sqrt(3.0));
   }
   return law;
+}
+
+MembraneLaw make_in_plane_law(const CellSettings& c) {
+  return WlcPow{{c.shear_modulus_uN_per_m * units::uN_per_m / shear_modulus_over_stiffness()}};
 }
 
 TriangleMesh make_mesh(const CellSettings& c) {
@@ -95,6 +98,7 @@ auto type_key(const CellSettings& c) {
 CellReference make_reference(const CellSettings& cell) {
   CellReference r;
   r.law = make_law(cell);
+  r.in_plane = make_in_plane_law(cell);
   r.mesh = make_mesh(cell);
   const int vertices = int(r.mesh.vertices.size());
   r.law.vertex_mass = cell.mass_pg / vertices;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "membrane/mesh.hpp"
+#include "membrane/laws.hpp"
 #include "membrane/triangle_forces.hpp"
 
 namespace corpuscle {
@@ -9,6 +10,7 @@ namespace corpuscle {
 struct CellReference {
   TriangleMesh mesh;  // symmetry axis z, as made or read
   CellLaw law;
+  MembraneLaw in_plane;
   std::vector<std::array<double, 3>> rest_length;  // [triangle] um, of the side opposite each corner
   std::vector<std::array<double, 3>> rest_angle;   // [triangle] rad, of that side, positive where convex outward
   std::vector<double> rest_area;                   // [triangle] um2

@@ -58,7 +58,7 @@ class Stretcher {
     RelaxationLimits limits = estimate_limits();
     start_relaxation(membranes_.views(), work_, limits);
     while (true) {
-      relax(membranes_.views(), work_, limits, step.iterations, check_every);
+      relax(membranes_.views(), membranes_.elasticity(), work_, limits, step.iterations, check_every);
       step.iterations += check_every;
       step.residual = largest_force(membranes_.views(), work_) / scale;
       if (step.residual <= settings_.tolerance) break;
@@ -67,7 +67,7 @@ class Stretcher {
     }
     Kokkos::deep_copy(membranes_.surfaces().v, 0.0);
     step.cell = membranes_.diagnostics()[0];
-    if (!(step.cell.stretch < SpringLaw::x_limit)) fail(step);
+    if (!(step.cell.stretch < membranes_.elasticity().limit())) fail(step);
     const Triple extent = step.cell.extent_um();
     step.axial_um = extent[0];
     step.transverse_um = extent[1];

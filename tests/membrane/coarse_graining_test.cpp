@@ -29,7 +29,7 @@ TEST_CASE("the formulas give Table 1") {
     // The vertex numbers behind the rows are known to about 0.1 %, lengths go with their square root.
     const double l0 = uniform_edge_length(135, row.vertices);
     CHECK(l0 == Approx(row.l0_um).epsilon(1e-3));
-    CHECK(l0 / SpringLaw::x0 == Approx(row.lm_um).epsilon(1e-3));
+    CHECK(l0 / WlcPowSpring::x0 == Approx(row.lm_um).epsilon(1e-3));
     // The rows' angles belong to up to 1.6 % more vertices than their lengths do.
     CHECK(spontaneous_angle(row.vertices) / units::degree == Approx(row.theta0_deg).epsilon(0.01));
     CHECK(persistence_times_length(6.32e-3) / l0 == Approx(row.p_um).epsilon(2e-3));

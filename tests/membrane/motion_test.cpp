@@ -35,7 +35,7 @@ bool stable(double mass_pg, double dt) {
   const MotionViews work = make_motion_views(m.views());
   for (int i = 0; i < 400; ++i) {
     measure_membranes(m.views(), m.surfaces().x);
-    evaluate_triangles(m.views(), m.surfaces().x);
+    m.elasticity().evaluate_triangles(m.views(), m.surfaces().x);
     predict_velocity(m.views(), work, NoLoad{}, dt);
     project_and_move(m.views(), work, dt, 1e-3);
   }
@@ -155,7 +155,7 @@ TEST_CASE("a pressure that is linear in space pushes a cell with its gradient ti
   std::vector<double> pressure;
   for (const Vec3& p : x) pressure.push_back(5 + dot(slope, p));
   measure_membranes(m.views(), m.surfaces().x);
-  evaluate_triangles(m.views(), m.surfaces().x);
+  m.elasticity().evaluate_triangles(m.views(), m.surfaces().x);
   const MotionViews work = make_motion_views(m.views());
   const double dt = 1e-3;
   predict_velocity(m.views(), work, FluidLoad{make_stress(pressure, std::vector<Vec3>(x.size()))}, dt);

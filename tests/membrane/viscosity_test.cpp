@@ -24,7 +24,7 @@ Vec3 torque_of_rotation(const Membranes& m, const Vec3& omega, double& magnitude
   std::vector<Vec3> v;
   for (const Vec3& p : x) v.push_back(cross(omega, p));
   const Components<double> force("corpuscle::test::force", m.vertices(), 3);
-  m.viscosity()->force(m.views(), make_field(v), force);
+  m.viscosity()->force(m.views(), m.elasticity(), make_field(v), force);
   Vec3 torque;
   magnitudes = 0;
   const auto f = to_host(force, m.vertices());
