@@ -1,6 +1,8 @@
 // What the small programs of this folder share: start and stop of MPI and Kokkos, the command line's length, errors.
 #pragma once
 
+#include "app/waiting.hpp"
+
 #include <Kokkos_Core.hpp>
 
 #include <cstdio>
@@ -21,6 +23,7 @@ int run_program(int argc, char** argv, int words, const char* usage, const Body&
     return 2;
   }
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
+  wait_briefly(argv);
 #ifdef CORPUSCLE_MPI
   MPI_Init(&argc, &argv);
 #endif

@@ -82,6 +82,49 @@ class LineShare {
   int left_, lower_j_, upper_j_;
 };
 
+#if !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
+/// Boxes of fewer cells than this are done by the calling thread. Waking the others and waiting for them costs 2 us with a
+/// core for each, and many times that where other work has one of the cores; a cell costs 1 to 5 ns.
+constexpr int worth_threads = 2048;
+
+#if defined(KOKKOS_ENABLE_SERIAL)
+using CallingThread = Kokkos::Serial;
+#else
+using CallingThread = Exec;
+#endif
+
+/// Run `body(i, j, k)` for one thread's share of the lines of a box.
+template <class Body>
+void run_lines(const std::array<int, 3>& lower, const std::array<int, 3>& upper, int thread, int threads,
+               const Body& body) {
+  const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
+  const int begin = lower[0], end = upper[0];
+  for (LineShare line(lower, upper, thread, threads); line.any(); line.next()) {
+    const int j = line.j, k = line.k;
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
+    for (int i = begin; i < end; ++i) cell(i, j, k);
+  }
+}
+
+/// Sum of `body(i, j, k)` over one thread's share of the lines of a box from (0, 0, 0).
+template <class Body>
+double sum_lines(const std::array<int, 3>& upper, int thread, int threads, const Body& body) {
+  const Body cell = body;
+  const int end = upper[0];
+  double sum = 0;
+  for (LineShare line({0, 0, 0}, upper, thread, threads); line.any(); line.next()) {
+    const int j = line.j, k = line.k;
+    double part = 0;
+#pragma omp simd reduction(+ : part)
+    for (int i = 0; i < end; ++i) part += cell(i, j, k);
+    sum += part;
+  }
+  return sum;
+}
+#endif
+
 /// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper. Cells must be independent of each other: on
 /// the host each line of cells along i is a vectorised loop.
 template <class Body>
@@ -95,17 +138,12 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
 #else
   // One iteration a thread: what a line costs beside its cells is soon as much as the cells of a short one.
   const int threads = Exec().concurrency();
-  Kokkos::parallel_for(label, Policy(0, threads), [=](int thread) CORPUSCLE_INLINE_ALL {
-    const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
-    const int begin = lower[0], end = upper[0];
-    for (LineShare line(lower, upper, thread, threads); line.any(); line.next()) {
-      const int j = line.j, k = line.k;
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC ivdep
-#endif
-      for (int i = begin; i < end; ++i) cell(i, j, k);
-    }
-  });
+  const auto share = [=](int thread) CORPUSCLE_INLINE_ALL { run_lines(lower, upper, thread, threads, body); };
+  const double cells = static_cast<double>(upper[0] - lower[0]) * (upper[1] - lower[1]) * (upper[2] - lower[2]);
+  if (cells < worth_threads)
+    Kokkos::parallel_for(label, Kokkos::RangePolicy<CallingThread>(0, threads), share);
+  else
+    Kokkos::parallel_for(label, Policy(0, threads), share);
 #endif
 }
 
@@ -127,7 +165,8 @@ void for_owned_rounded(const std::string& label, const IndexSpace& index, const 
 #endif
 }
 
-/// Sum of `body(i, j, k)` over this rank's owned cells. The order of summation depends on the number of threads only.
+/// Sum of `body(i, j, k)` over this rank's owned cells. The order of summation depends on the number of threads only,
+/// not on which of them does the work.
 template <class Body>
 double sum_owned(const std::string& label, const IndexSpace& index, const Body& body) {
   double sum = 0;
@@ -141,20 +180,13 @@ double sum_owned(const std::string& label, const IndexSpace& index, const Body& 
 #else
   const std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
   const int threads = Exec().concurrency();
-  Kokkos::parallel_reduce(
-      label, Policy(0, threads),
-      [=](int thread, double& total) CORPUSCLE_INLINE_ALL {
-        const Body cell = body;
-        const int end = upper[0];
-        for (LineShare line({0, 0, 0}, upper, thread, threads); line.any(); line.next()) {
-          const int j = line.j, k = line.k;
-          double part = 0;
-#pragma omp simd reduction(+ : part)
-          for (int i = 0; i < end; ++i) part += cell(i, j, k);
-          total += part;
-        }
-      },
-      sum);
+  const auto share = [=](int thread, double& total) CORPUSCLE_INLINE_ALL {
+    total += sum_lines(upper, thread, threads, body);
+  };
+  if (index.owned() < worth_threads)
+    Kokkos::parallel_reduce(label, Kokkos::RangePolicy<CallingThread>(0, threads), share, sum);
+  else
+    Kokkos::parallel_reduce(label, Policy(0, threads), share, sum);
 #endif
   return sum;
 }

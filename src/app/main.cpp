@@ -1,5 +1,6 @@
 // corpuscle: the command line.
 #include "app/run.hpp"
+#include "app/waiting.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "input/case.hpp"
@@ -138,6 +139,7 @@ int execute(const Comm& comm, const Command& command) {
 
 int main(int argc, char** argv) {
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
+  wait_briefly(argv);
   CLI::App app{"Red blood cells in flowing plasma", "corpuscle"};
   Command command;
   std::unique_ptr<CLI::ParseError> refused;

@@ -4,6 +4,7 @@
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
 #include "app/surfaces.hpp"
+#include "app/waiting.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/restart.hpp"
@@ -42,6 +43,7 @@ Report start_report(const Comm& comm, const Case& scene) {
   report.case_path = scene.path;
   report.title = scene.title;
   report.resolved = scene.resolved;
+  report.extra["waiting"] = waiting_policy();
   const auto modules = list_modules(scene, comm.size());
   report.active = modules.active;
   report.left_out = modules.left_out;

@@ -2,9 +2,36 @@
 
 #include <HYPRE_parcsr_ls.h>
 
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
 namespace corpuscle {
 
 namespace {
+
+/// While it lives, hypre's loops run on the calling thread where there are so few rows that the other threads would cost
+/// more than they save: some 170 launches a step on the coarsest level of a multigrid.
+class HypreThreads {
+ public:
+  explicit HypreThreads([[maybe_unused]] int rows) {
+#ifdef _OPENMP
+    before_ = omp_get_max_threads();
+    if (rows < fewest_rows) omp_set_num_threads(1);
+#endif
+  }
+  ~HypreThreads() {
+#ifdef _OPENMP
+    omp_set_num_threads(before_);
+#endif
+  }
+  HypreThreads(const HypreThreads&) = delete;
+  HypreThreads& operator=(const HypreThreads&) = delete;
+
+ private:
+  static constexpr int fewest_rows = 2048;
+  int before_ = 1;
+};
 
 HYPRE_Solver make_boomer_amg() {
   HYPRE_Solver amg = nullptr;
@@ -34,6 +61,7 @@ AlgebraicMultigrid::~AlgebraicMultigrid() {
 }
 
 void AlgebraicMultigrid::set_up() {
+  const HypreThreads threads(system_->rows());
   if (amg_) HYPRE_BoomerAMGDestroy(amg_);
   amg_ = make_boomer_amg();
   HYPRE_BoomerAMGSetup(amg_, system_->matrix(), system_->rhs(), system_->x());
@@ -42,6 +70,7 @@ void AlgebraicMultigrid::set_up() {
 }
 
 void AlgebraicMultigrid::cycle(const Array<double>& rhs, const Array<double>& x) {
+  const HypreThreads threads(system_->rows());
   Kokkos::deep_copy(x, 0.0);
   system_->load(rhs, x);
   HYPRE_BoomerAMGSolve(amg_, system_->matrix(), system_->rhs(), system_->x());

@@ -30,6 +30,7 @@ class HypreSystem {
   void load(const Array<double>& rhs, const Array<double>& x);
   void read(const Array<double>& x);
 
+  int rows() const { return rows_; }
   const Comm& comm() const { return comm_; }
   /// Of all calls that concern this system; those of set_values(), load() and read() are not raised there.
   HypreErrors& errors() { return errors_; }

@@ -72,6 +72,7 @@ using Words = std::vector<std::string>;
 
 struct Launch {
   int threads = 1, ranks = 1;
+  std::string waiting = "OMP_WAIT_POLICY=passive";  // options and variables for env
 };
 
 struct Outcome {
@@ -79,11 +80,11 @@ struct Outcome {
   std::string output;  // what went to the screen
 };
 
-/// Run the program in `folder` and wait for it. Its threads yield while they wait: on a machine with other work, or
+/// Run the program in `folder` and wait for it. Unless told otherwise its threads yield while they wait: on a machine with other work, or
 /// with one core, they would spend most of their time in each other's way.
 inline Outcome start(const fs::path& folder, const Words& words, const Launch& launch = {}) {
   std::string command = "cd " + quoted(folder.string()) + " && timeout 120 env" + without_mpi_environment() +
-                        " OMP_WAIT_POLICY=passive OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
+                        " " + launch.waiting + " OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
   if (launch.ranks > 1)
     command += "mpirun -n " + std::to_string(launch.ranks) + " --oversubscribe --allow-run-as-root ";
   command += quoted(CORPUSCLE_PROGRAM);
