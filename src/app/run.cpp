@@ -1,6 +1,7 @@
 #include "app/run.hpp"
 
 #include "app/error_estimate.hpp"
+#include "app/estimate.hpp"
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
 #include "app/surfaces.hpp"
@@ -251,6 +252,7 @@ std::string result_folder(const RunOptions& options) {
 
 void run_case(const Comm& comm, const RunOptions& options) {
   const Case scene = read_case(options.case_path, options.overrides);
+  const MemoryEstimate memory = require_memory(comm, scene);
   const std::string folder = result_folder(options);
   if (!options.estimate.empty() && !options.restart.empty())
     throw InputError("--estimate-error compares whole runs: leave out --restart");
@@ -264,6 +266,7 @@ void run_case(const Comm& comm, const RunOptions& options) {
     std::filesystem::remove(folder + "/report.json");  // of an earlier run: this one may not get to write its own
   });
   print_start(comm, scene);
+  info("memory:   {}", memory_text(memory, comm.size()));
   Report report = run_scene(comm, scene, options, folder);
   if (!coarser.empty()) estimate_errors(comm, scene, options, coarser, folder, report);
   print_end(report, folder);
@@ -271,11 +274,13 @@ void run_case(const Comm& comm, const RunOptions& options) {
 
 void check_case(const Comm& comm, const RunOptions& options) {
   const Case scene = read_case(options.case_path, options.overrides);
+  const MemoryEstimate memory = require_memory(comm, scene);
   print_start(comm, scene);
+  info("memory:   {}", memory_text(memory, comm.size()));
   if (scene.stretching) {
     Membranes membranes(scene.cells);
     info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
-    info("estimate: {:.0f} MB, {:.2g} s", peak_rss_mb(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
+    info("estimate: {:.0f} MB, {:.2g} s", memory.rank(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
     info("{} is valid", scene.path);
     return;
   }
@@ -298,7 +303,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
   // Seconds per cell and step on one core, measured with the tube; about ten times that on skewed grids.
   const double rate = simulation.grid().orthogonal() ? 1.1e-6 : 1e-5;
   const double cores = static_cast<double>(comm.size()) * thread_count();
-  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", comm.sum(peak_rss_mb()), simulation.steps_left(),
+  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", memory.rank() * comm.size(), simulation.steps_left(),
        rate * nodes * simulation.steps_left() / cores);
   info("{} is valid", scene.path);
 }

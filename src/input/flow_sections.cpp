@@ -1,11 +1,15 @@
 // [time], [grid], [fluid] and [[boundary]].
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "core/units.hpp"
 #include "input/sections.hpp"
 
 namespace corpuscle {
 namespace {
+
+constexpr double most_um = 1e7;  // of a grid: volumes and their squares stay far from the largest numbers
 
 void read_centerline(Section& s, GridSettings& grid) {
   using Centerline = GridSettings::Centerline;
@@ -19,16 +23,19 @@ void read_centerline(Section& s, GridSettings& grid) {
     grid.points_um = s.rows<3>("points_um", 3);
     s.require("points_um", "a list of 3 or more points [x, y, z]");
   }
-  if (needs(Centerline::arc, "arc", "arc_radius_um")) grid.arc_radius_um = s.number("arc_radius_um", positive());
+  if (needs(Centerline::arc, "arc", "arc_radius_um")) grid.arc_radius_um = s.number("arc_radius_um", positive(most_um));
   if (needs(Centerline::arc, "arc", "arc_angle_deg")) grid.arc_angle_deg = s.number("arc_angle_deg", positive(350));
   if (needs(Centerline::helix, "helix", "helix_radius_um"))
-    grid.helix_radius_um = s.number("helix_radius_um", positive());
-  if (needs(Centerline::helix, "helix", "helix_pitch_um")) grid.helix_pitch_um = s.number("helix_pitch_um", positive());
+    grid.helix_radius_um = s.number("helix_radius_um", positive(most_um));
+  if (needs(Centerline::helix, "helix", "helix_pitch_um")) grid.helix_pitch_um = s.number("helix_pitch_um", positive(most_um));
   if (needs(Centerline::helix, "helix", "helix_turns")) grid.helix_turns = s.number("helix_turns", positive(1000));
 }
 
 void check_grid(const Section& s, const GridSettings& grid) {
   using Generator = GridSettings::Generator;
+  for (const auto& point : grid.points_um)
+    for (double x : point)
+      if (std::abs(x) > most_um) s.fail("points_um", fmt::format("must lie within {} um of the origin", most_um));
   for (int d = 0; d < 3 && grid.generator == Generator::box; ++d)
     if (grid.upper_um[d] <= grid.lower_um[d])
       s.fail("upper_um",
@@ -70,11 +77,11 @@ GridSettings read_grid(Section& s) {
   };
   if (file) s.unused("nodes", "the file decides how many nodes the grid has: leave this key out");
   if (!file) grid.nodes = s.integers("nodes", 4, 100000);
-  if (needs(box, "\"box\"", "lower_um")) grid.lower_um = s.triple("lower_um", any_number());
-  if (needs(box, "\"box\"", "upper_um")) grid.upper_um = s.triple("upper_um", any_number());
+  if (needs(box, "\"box\"", "lower_um")) grid.lower_um = s.triple("lower_um", between(-most_um, most_um));
+  if (needs(box, "\"box\"", "upper_um")) grid.upper_um = s.triple("upper_um", between(-most_um, most_um));
   const char* tubes = "\"straight_tube\" or \"swept_tube\"";
-  if (needs(straight || swept, tubes, "diameter_um")) grid.diameter_um = s.number("diameter_um", positive());
-  if (needs(straight, "\"straight_tube\"", "length_um")) grid.length_um = s.number("length_um", positive());
+  if (needs(straight || swept, tubes, "diameter_um")) grid.diameter_um = s.number("diameter_um", positive(most_um));
+  if (needs(straight, "\"straight_tube\"", "length_um")) grid.length_um = s.number("length_um", positive(most_um));
   if (needs(straight || swept, tubes, "cross_section"))
     grid.cross_section = s.choice<CrossSection>(
         "cross_section", {{"conformal", CrossSection::conformal}, {"elliptical", CrossSection::elliptical}},

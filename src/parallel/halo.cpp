@@ -43,27 +43,32 @@ CellBox slab(const IndexSpace& index, int d, int side, bool outside) {
 
 }  // namespace
 
-IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,
-                     std::array<int, 3>* ranks_per_direction) {
+std::array<int, 3> ranks_per_direction(int ranks, const std::array<int, 3>& global) {
   std::array<int, 3> best{};
   double least = std::numeric_limits<double>::max();
-  for (int a = 1; a <= comm.size(); ++a) {
-    if (comm.size() % a) continue;
-    for (int b = 1; b <= comm.size() / a; ++b) {
-      if ((comm.size() / a) % b) continue;
-      const std::array<int, 3> ranks{a, b, comm.size() / a / b};
-      if (!cut_is_possible(ranks, global)) continue;
+  for (int a = 1; a <= ranks; ++a) {
+    if (ranks % a) continue;
+    for (int b = 1; b <= ranks / a; ++b) {
+      if ((ranks / a) % b) continue;
+      const std::array<int, 3> blocks{a, b, ranks / a / b};
+      if (!cut_is_possible(blocks, global)) continue;
       double cut = 0;
       for (int d = 0; d < 3; ++d)
-        cut += (ranks[d] - 1.0) * global[(d + 1) % 3] * global[(d + 2) % 3];
-      if (cut < least) least = cut, best = ranks;
+        cut += (blocks[d] - 1.0) * global[(d + 1) % 3] * global[(d + 2) % 3];
+      if (cut < least) least = cut, best = blocks;
     }
   }
   if (best[0] == 0)
     throw InputError(fmt::format(
         "the grid of {} x {} x {} cells cannot be cut into {} blocks of at least {} cells a side: use fewer ranks or "
         "a finer grid (grid.nodes)",
-        global[0], global[1], global[2], comm.size(), IndexSpace::halo));
+        global[0], global[1], global[2], ranks, IndexSpace::halo));
+  return best;
+}
+
+IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,
+                     std::array<int, 3>* ranks) {
+  const std::array<int, 3> best = ranks_per_direction(comm.size(), global);
   const auto at = coordinates(comm.rank(), best);
   IndexSpace index;
   for (int d = 0; d < 3; ++d) {
@@ -73,7 +78,7 @@ IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const s
     index.global[d] = global[d];
     index.periodic[d] = periodic[d];
   }
-  if (ranks_per_direction) *ranks_per_direction = best;
+  if (ranks) *ranks = best;
   return index;
 }
 

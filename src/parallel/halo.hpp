@@ -8,6 +8,10 @@
 
 namespace corpuscle {
 
+/// How many blocks along each direction have the least surface between them.
+/// @throws InputError  when some block would be thinner than the halo.
+std::array<int, 3> ranks_per_direction(int ranks, const std::array<int, 3>& global);
+
 /// Cut a grid of global[] cells into comm.size() blocks along all three directions, with the least surface.
 /// @throws InputError  when some block would be thinner than the halo.
 IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,

@@ -1,0 +1,233 @@
+#include "app/estimate.hpp"
+
+#include "core/error.hpp"
+#include "grid/grid.hpp"
+#include "grid/node_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+namespace corpuscle {
+
+namespace {
+
+constexpr double bytes_per_mb = 1024 * 1024;
+constexpr int halo = IndexSpace::halo;
+
+/// What bends or is skewed is so on a finer grid too: larger grids are looked at with about this many cells, in milliseconds.
+constexpr double sample_cells = 5e4;
+
+/// Mean distance between neighbouring nodes along d, over some of them.
+double mean_spacing(const NodeSource& source, int d) {
+  double sum = 0;
+  int count = 0;
+  std::array<int, 3> at{}, step{};
+  for (int m = 0; m < 3; ++m) step[m] = std::max(1, source.cells[m] / 8);
+  for (at[2] = 0; at[2] < source.cells[2]; at[2] += step[2])
+    for (at[1] = 0; at[1] < source.cells[1]; at[1] += step[1])
+      for (at[0] = 0; at[0] < source.cells[0]; at[0] += step[0], ++count) {
+        auto next = at;
+        ++next[d];
+        const Triple a = source.node(at[0], at[1], at[2]), b = source.node(next[0], next[1], next[2]);
+        sum += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+      }
+  return sum / count;
+}
+
+/// Skewness and mean spacings of the case's grid, from one of fewer cells.
+void sample_grid(const GridSettings& settings, SceneSize& size) {
+  GridSettings few = settings;
+  const double ratio = std::cbrt(sample_cells / (size.cells[0] * size.cells[1] * size.cells[2]));
+  for (int d = 0; d < 3 && ratio < 1; ++d)
+    few.nodes[d] = std::max(std::min(4, few.nodes[d]), 1 + static_cast<int>(ratio * size.cells[d]));
+  const NodeSource source = make_node_source(few);
+  for (int d = 0; d < 3; ++d) size.spacing[d] = mean_spacing(source, d) * source.cells[d] / size.cells[d];
+  try {
+#ifdef CORPUSCLE_MPI
+    const Comm alone(MPI_COMM_SELF);
+#else
+    const Comm alone;
+#endif
+    size.skewed = !Grid(alone, source, size.periodic).orthogonal();
+  } catch (const InputError&) {
+    // Folded, perhaps since it is coarse; if not, the grid itself says so when it is built.
+  }
+}
+
+void measure_grid(const Case& scene, int ranks, SceneSize& size) {
+  const GridSettings& grid = *scene.grid;
+  std::array<int, 3> cells{};
+  if (grid.generator == GridSettings::Generator::file) {
+    cells = cells_of_node_file(grid.file);
+    size.sampled = false;
+    size.skewed = true;  // it may be
+    size.spacing = {1, 1, 1};
+  } else {
+    for (int d = 0; d < 3; ++d) cells[d] = grid.nodes[d] - 1;
+  }
+  const auto blocks = ranks_per_direction(ranks, cells);
+  for (int d = 0; d < 3; ++d) {
+    size.cells[d] = cells[d];
+    size.block[d] = std::ceil(size.cells[d] / blocks[d]);
+    size.cut[d] = blocks[d] > 1;
+  }
+  for (const auto& boundary : scene.boundaries)
+    if (boundary.type == BoundarySettings::Type::periodic) size.periodic[static_cast<int>(boundary.side) / 2] = true;
+  for (bool periodic : size.periodic)
+    if (periodic) size.images *= 3;
+  if (size.sampled) sample_grid(grid, size);
+}
+
+/// Vertices of a surface in a file, from its length: OFF takes some 70 bytes for a vertex and its two triangles, binary STL 100.
+double vertices_in_file(const std::string& path) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : static_cast<double>(bytes) / 70;
+}
+
+double vertices_of(const BodySettings& body, const SceneSize& size) {
+  if (body.shape == BodySettings::Shape::file) return vertices_in_file(body.file);
+  if (body.vertices > 0) return body.vertices;
+  const Triple axes = body.shape == BodySettings::Shape::sphere
+                          ? Triple{body.radius_um, body.radius_um, body.radius_um} : body.semi_axes_um;
+  const double largest = std::max({axes[0], axes[1], axes[2]});
+  const double h2 = std::pow(size.spacing[0] * size.spacing[1] * size.spacing[2], 2.0 / 3);
+  return std::clamp(4 * std::acos(-1.0) * largest * largest / (0.87 * h2), 162.0, 100000.0);
+}
+
+/// Cells of all multigrid levels over those of the finest, halos included; `coarsest`: of the last one.
+/// The same choices as MultigridHierarchy's, on mean spacings.
+double levels_over_finest(const SceneSize& size) {
+  auto global = size.cells, block = size.block, h = size.spacing;
+  double sum = 1;
+  while (global[0] * global[1] * global[2] > 300) {
+    const double least = std::min({h[0], h[1], h[2]});
+    bool coarser = false, stuck = false;
+    for (int d = 0; d < 3; ++d) {
+      if (least * least < 0.4 * h[d] * h[d]) continue;
+      stuck = stuck || block[d] < (size.cut[d] || size.periodic[d] ? 2 * halo : 2);
+      coarser = true;
+      global[d] = std::ceil(global[d] / 2), block[d] = std::ceil(block[d] / 2), h[d] *= 2;
+    }
+    if (stuck || !coarser) break;
+    sum += (block[0] + 2 * halo) * (block[1] + 2 * halo) * (block[2] + 2 * halo) / size.padded();
+  }
+  return sum;
+}
+
+/// @throws InputError  if `count` reaches two to the power of 31
+void require_below(double count, const char* what, const char* remedy, double limit = 2147483647.0) {
+  if (count <= limit) return;
+  throw InputError(fmt::format("grid.nodes: {} would be {:.3g}, and the program counts them up to {:.3g} on a rank: {}", what,
+                               count, limit, remedy));
+}
+
+}  // namespace
+
+double SceneSize::padded() const {
+  return (block[0] + 2 * halo) * (block[1] + 2 * halo) * (block[2] + 2 * halo);
+}
+
+SceneSize measure_scene(const Case& scene, int ranks) {
+  SceneSize size;
+  if (scene.grid) measure_grid(scene, ranks, size);
+  for (const auto& cell : scene.cells) size.vertices += cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh);
+  for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
+  return size;
+}
+
+MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ranks) {
+  const bool surfaces = !scene.cells.empty() || !scene.bodies.empty();
+  const bool convective = scene.fluid && scene.fluid->convection != FluidSettings::Convection::none;
+  const double nodes = size.padded(), owned = size.owned();
+  // Bytes of each array of a node, of the classes named; doubles are 8, vectors of the cycles 12.
+  const double grid = 24 + 72 + 8 + 1;                                  // Grid: centres, faces, volumes, kinds
+  const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
+  const double krylov = 5 * 12;                                         // FluidSolver::Momentum
+  const double search = surfaces ? 51 : 0;                              // ImmersedBoundary
+  const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
+  const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
+  const double rows = 19;
+  // PressureSolver: values, slots, packed, columns, numbers; hypre's matrix, once more while it takes the values; the
+  // vectors of flexible GMRES, two for each of up to 60 iterations.
+  const double matrix = rows * (8 + 4 + 8 + 4 + 4) + rows * 2 * (8 + 4) + 2 * 60 * 8;
+  MemoryEstimate mb;
+  mb.program = ranks > 1 ? 36 : 32;
+  if (scene.grid) {
+    mb.fields = (nodes * (grid + solver + krylov + search + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
+    mb.multigrid = nodes * cycles * levels_over_finest(size) / bytes_per_mb;
+    if (size.skewed) mb.pressure_matrix = owned * matrix / bytes_per_mb;
+    // A vector of every node in the order of the file, on the device and on the host.
+    mb.output = owned * 2 * 24 / bytes_per_mb;
+    // A grid from a file: all its nodes, on every rank, while the geometry is made.
+    if (!size.sampled) mb.output += size.cells[0] * size.cells[1] * size.cells[2] * 24 / bytes_per_mb;
+    double faces = 0;
+    for (int d = 0; d < 3; ++d)
+      if (size.cut[d]) faces = std::max(faces, nodes / (size.block[d] + 2 * halo) * halo);
+    mb.output += faces * 3 * 8 * 4 / bytes_per_mb;
+  }
+  // Geometry, motion, tractions and search of a vertex and its two triangles; its places under each image; the rows of the
+  // two immersed nodes beside it, with 16 entries for the velocity and for the pressure.
+  mb.surfaces = size.vertices * (1500 + 60 * size.images + 2 * 2 * 16 * 12) / bytes_per_mb;
+  return mb;
+}
+
+void require_countable(const SceneSize& size, int ranks) {
+  const char* more = ranks > 1 ? "use more ranks or fewer nodes (grid.nodes)" : "use ranks (mpirun -n) or fewer nodes (grid.nodes)";
+  require_below((size.block[0] + 7) * (size.block[1] + 7) * (size.block[2] + 7), "the nodes of a rank with its halo", more);
+  for (int d = 0; d < 3; ++d) {
+    const double side = size.padded() / (size.block[d] + 2 * halo) * halo;
+    if (size.cut[d]) require_below(side * 3 * 8, "the bytes of a message between two ranks", more);
+  }
+  if (ranks > 1) require_below(size.owned() * 3 * 8, "the bytes of a field that a rank writes at once", more);
+  if (size.skewed) {
+    require_below(size.owned() * 19, "the matrix entries of a rank on a skewed grid", more);
+    require_below(size.cells[0] * size.cells[1] * size.cells[2], "the rows of the pressure matrix on a skewed grid",
+                  "use fewer nodes (grid.nodes), or a grid without skewness");
+  }
+  // Triangles are twice the vertices; the search numbers them together with the images under which they are seen.
+  if (2 * size.vertices * size.images > 2147483647.0 || 3 * size.vertices > 2147483647.0)
+    throw InputError(fmt::format("cells, bodies: {:.3g} triangles under {:.0f} periodic images are more than the program "
+                                 "counts (2.1e9): use fewer vertices",
+                                 2 * size.vertices, size.images));
+}
+
+MemoryEstimate require_memory(const Comm& comm, const Case& scene) {
+  const SceneSize size = measure_scene(scene, comm.size());
+  const MemoryEstimate estimate = estimate_memory(scene, size, comm.size());
+  int neighbours = 1;
+#ifdef CORPUSCLE_MPI
+  if (comm.size() > 1) {
+    MPI_Comm node;
+    MPI_Comm_split_type(comm.handle(), MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
+    MPI_Comm_size(node, &neighbours);
+    MPI_Comm_free(&node);
+  }
+#endif
+  const double at_hand = memory_at_hand_mb(), needed = estimate.rank() * neighbours;
+  if (comm.max(needed - at_hand) > 0) {
+    const double most = comm.max(needed), least = comm.min(at_hand);
+    const std::string shared = comm.size() == 1 ? "" : fmt::format(" for {} ranks on one machine", comm.max(neighbours));
+    throw InputError(fmt::format(
+        "grid.nodes: {} grid cells need about {:.3g} GB of memory{}, and {:.3g} GB are at hand: use fewer nodes, or {}",
+        fmt::format("{:.0f} x {:.0f} x {:.0f}", size.cells[0], size.cells[1], size.cells[2]), most / 1024, shared, least / 1024,
+        comm.size() == 1 ? "ranks on more machines (mpirun)" : "more machines"));
+  }
+  require_countable(size, comm.size());
+  return estimate;
+}
+
+std::string memory_text(const MemoryEstimate& mb, int ranks) {
+  std::string parts;
+  for (const auto& [name, value] : {std::pair{"fields", mb.fields}, {"multigrid", mb.multigrid},
+                                    {"pressure matrix", mb.pressure_matrix}, {"surfaces", mb.surfaces},
+                                    {"output", mb.output}, {"program", mb.program}})
+    if (value >= 0.5) parts += fmt::format("{}{} {:.0f}", parts.empty() ? "" : ", ", name, value);
+  return fmt::format("about {:.0f} MB{} ({})", mb.rank() * ranks, ranks > 1 ? fmt::format(" on {} ranks", ranks) : "", parts);
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,53 @@
+// How much memory a scene takes, and whether it can be had: from the case alone, before anything is built.
+#pragma once
+
+#include "input/case.hpp"
+#include "parallel/comm.hpp"
+
+namespace corpuscle {
+
+/// What the memory of a scene depends on. Counts are numbers of a kind that no case overflows.
+struct SceneSize {
+  std::array<double, 3> cells{};     // of the whole grid; zero without one
+  std::array<double, 3> block{};     // of the largest rank
+  std::array<double, 3> spacing{};   // mean, um, along each index direction
+  std::array<bool, 3> periodic{}, cut{};
+  bool skewed = false;               // the pressure equation needs a matrix
+  bool sampled = true;               // skewness and spacing are the grid's; false: of a file that was not read
+  double vertices = 0;               // of all surfaces
+  double images = 1;                 // under which each surface is seen: 3 for every periodic direction
+
+  double owned() const { return block[0] * block[1] * block[2]; }
+  /// With the halo.
+  double padded() const;
+};
+
+/// @throws InputError  for a grid that cannot be cut into that many blocks
+SceneSize measure_scene(const Case& scene, int ranks);
+
+/// Of the largest rank, MB.
+struct MemoryEstimate {
+  double program = 0, fields = 0, multigrid = 0, pressure_matrix = 0, surfaces = 0, output = 0;
+
+  double rank() const { return program + fields + multigrid + pressure_matrix + surfaces + output; }
+};
+
+/// Within 25 % of the largest resident memory of a run, on the scenes of the tests.
+MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ranks);
+
+/// Counts that the program, MPI, hypre or HDF5 hold in 32 bits.
+/// @throws InputError  naming the count, its limit and what to do
+void require_countable(const SceneSize& size, int ranks);
+
+/// Memory that this process may still take, MB: what the machine has left, or a limit of its control group or process.
+double memory_at_hand_mb();
+
+/// Refuse what cannot be counted, or does not fit the memory at hand of a machine that its ranks share. All ranks call.
+/// @return the estimate, of the largest rank
+/// @throws InputError  on every rank, with the figures
+MemoryEstimate require_memory(const Comm& comm, const Case& scene);
+
+/// One line of the screen.
+std::string memory_text(const MemoryEstimate& estimate, int ranks);
+
+}  // namespace corpuscle
