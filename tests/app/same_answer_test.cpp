@@ -44,7 +44,7 @@ void require_same_state(const fs::path& a, const fs::path& b, bool cell) {
     double largest = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       different += std::memcmp(&x[i], &y[i], sizeof x[i]) != 0;
-      largest = larger(largest, std::abs(x[i] - y[i]));
+      largest = corpuscle::larger(largest, std::abs(x[i] - y[i]));
     }
     INFO(name << ": " << different << " of " << x.size() << " numbers differ, by up to " << largest);
     CHECK(different == 0);
