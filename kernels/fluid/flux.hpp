@@ -140,6 +140,21 @@ inline void scalar_from_compact(const IndexSpace& index, const Array<double>& ve
   });
 }
 
+inline void compact_from_scalar(const IndexSpace& index, const Array<double>& field, const Array<double>& vector) {
+  for_owned("corpuscle::fluid::vector_from_scalar", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    vector(index.compact(i, j, k)) = field(index.cell(i, j, k));
+  });
+}
+
+/// change (compact) = field - before (compact).
+inline void compact_difference(const IndexSpace& index, const Array<double>& field, const Array<double>& before,
+                               const Array<double>& change) {
+  for_owned("corpuscle::fluid::vector_difference", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int e = index.compact(i, j, k);
+    change(e) = field(index.cell(i, j, k)) - before(e);
+  });
+}
+
 /// Largest magnitude in a compact vector; not a number if any entry is not.
 inline double largest_magnitude(const Array<double>& vector) {
   double largest = 0;

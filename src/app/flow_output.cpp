@@ -1,5 +1,6 @@
 #include "app/flow_output.hpp"
 
+#include "app/figure_levels.hpp"
 #include "app/reference_flows.hpp"
 #include "common/extremes.hpp"
 #include "core/error.hpp"
@@ -73,6 +74,7 @@ void FlowOutput::gather() {
   const auto& fluid = simulation_.fluid().statistics();
   momentum_.add(fluid.momentum_iterations);
   pressure_.add(fluid.pressure_iterations);
+  projections_.add(fluid.projections);
   const double spacing = simulation_.grid().mean_spacing();
   if (fluid.reference_speed > 0)
     divergence_ = larger(divergence_, fluid.divergence / (fluid.reference_speed * spacing * spacing));
@@ -91,6 +93,7 @@ void FlowOutput::after_step(bool start) {
     if (history_) write_history();
     energy_.sample(elastic_energy_);
   }
+  if (!start && due(output.every_us)) splitting_ = std::max(splitting_, simulation_.fluid().splitting());
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -255,7 +258,9 @@ void FlowOutput::fill_quantities(Report& report) const {
     }
     for (int d = 0; d < 3; ++d) {
       if (cell) all[of + "centroid_" + axes[d] + "_um"] = (*sample.centroid_um)[d];
-      if (!cell) all[of + "force_" + axes[d] + "_nN"] = (*sample.force_nN)[d];
+      // The momentum balance converges faster: 0.4 to 1.4 % off where the sum of tractions is 4 to 22 % low.
+      if (!cell) all[of + "force_" + axes[d] + "_nN"] = sample.more[sample.more.size() - 3 + d];
+      if (!cell) all[of + "traction_force_" + axes[d] + "_nN"] = (*sample.force_nN)[d];
       if (!cell) all[of + "torque_" + axes[d] + "_nN_um"] = (*sample.torque_nN_um)[d];
     }
   }
@@ -264,11 +269,22 @@ void FlowOutput::fill_quantities(Report& report) const {
   if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
 }
 
+/// Share of the surfaces' vertices whose last traction did not come from a full fit.
+double FlowOutput::traction_fallbacks() const {
+  const auto fits = simulation_.immersed()->boundary().traction_fallbacks();
+  const Comm& comm = simulation_.grid().comm();
+  double all = 0, poor = 0;
+  for (int how = traction_fitted; how <= traction_nothing; ++how) all += fits[how];
+  for (int how : {traction_gradient, traction_normal, traction_nothing, pressure_average, pressure_nothing}) poor += fits[how];
+  all = comm.sum(all), poor = comm.sum(poor);
+  return all > 0 ? poor / all : 0;
+}
+
 void FlowOutput::fill(Report& report) {
   auto& errors = report.errors;
   errors["max_divergence"] = divergence_;
   errors["flux_correction"] = flux_correction_;
-  errors["splitting"] = simulation_.fluid().splitting();
+  errors["splitting"] = splitting_;
   errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
   if (simulation_.surfaces()) {
     errors["slip"] = slip_;
@@ -281,7 +297,10 @@ void FlowOutput::fill(Report& report) {
                                 {"velocity_fallbacks", search.velocity_fallbacks},
                                 {"least_wall_spacings", search.least_wall_spacings},
                                 {"traction_fits", simulation_.immersed()->boundary().traction_fallbacks()}};
-    if (search.least_body_spacings < 1e30) report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
+    errors["traction_fallbacks"] = traction_fallbacks();
+    if (search.least_wall_spacings < 1e30) errors["least_wall_spacings"] = search.least_wall_spacings;
+    if (search.least_body_spacings < 1e30)
+      errors["least_body_spacings"] = report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
   }
   if (simulation_.membranes()) {
     errors["volume_drift"] = volume_drift_;
@@ -291,10 +310,13 @@ void FlowOutput::fill(Report& report) {
     report.extra["stability"] = simulation_.coupling()->report(simulation_.last_step_us());
   }
   fill_energy(report);
+  report.warnings = judge(errors, {simulation_.fluid().statistics().reference_speed, energy_.largest_fJ(),
+                                   scene_.fluid->convection == FluidSettings::Convection::none});
   fill_quantities(report);
   for (const auto& [name, value] : reference_errors(scene_, simulation_)) errors[name] = value;
   report.momentum_iterations = momentum_;
   report.pressure_iterations = pressure_;
+  report.projections = projections_;
   report.coupling_iterations = coupling_;
   report.membrane_substeps = substeps_;
   Triple mean = mean_velocity(simulation_.fluid());

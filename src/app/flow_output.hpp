@@ -41,6 +41,7 @@ class FlowOutput {
   void write_cells();
   void fill_energy(Report& report) const;
   void fill_quantities(Report& report) const;
+  double traction_fallbacks() const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
@@ -56,11 +57,12 @@ class FlowOutput {
 #endif
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
-  Tally momentum_, pressure_, coupling_, substeps_, residual_;
+  Tally momentum_, pressure_, projections_, coupling_, substeps_, residual_;
   EnergyBalance energy_;
   std::vector<HistorySample> last_;  // of every cell and body, at the last history sample
   double elastic_energy_ = 0;  // of all cells at the last history sample, fJ
   double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
+  double splitting_ = 0;  // largest at the times of fields and cells
 };
 
 }  // namespace corpuscle

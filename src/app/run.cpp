@@ -2,6 +2,7 @@
 
 #include "app/error_estimate.hpp"
 #include "app/estimate.hpp"
+#include "app/figure_levels.hpp"
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
 #include "app/surfaces.hpp"
@@ -62,10 +63,7 @@ void print_end(const Report& report, const std::string& folder) {
   for (const auto& [name, value] : report.errors.items())
     if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
   info("errors:{}", errors);
-  const auto drift = report.errors.find("area_drift");
-  if (drift != report.errors.end() && drift->is_number() && drift->get<double>() > FlowOutput::lysis_area)
-    warn("a cell's area changed by {:.0f} %: a real membrane breaks at about 4 %, so this load is beyond the model",
-         100 * drift->get<double>());
+  for (const auto& warning : report.warnings) warn("{}", warning["message"].get<std::string>());
   if (!report.quantities.empty()) info("at the end:");
   print_quantities(report);
   info("results in {}", folder);
@@ -80,6 +78,8 @@ void print_schedule(const StepSchedule& schedule) {
     const double from = StepSchedule::steps_per_length * lengths[n];
     if (from < schedule.time_us(schedule.end())) text += fmt::format(", {:g} us from {:g} us on", lengths[n], from);
   }
+  const auto again = schedule.restarts_us();
+  if (!again.empty()) text += fmt::format("; as from the start at {:g} us, where the inflow changes", fmt::join(again, ", "));
   info("steps: {}; {} in all", text, schedule.steps_from(0));
 }
 
@@ -190,6 +190,7 @@ Report run_stretching(const Comm& comm, const Case& scene, const std::string& fo
   report.extra["rest_shape"] = {{"diameter_um", result.rest.diameter_um},
                                 {"thickness_center_um", result.rest.thickness_center_um},
                                 {"thickness_max_um", result.rest.thickness_max_um}};
+  report.warnings = judge(report.errors, {});
   report.extra["patch_vertices"] = result.patch_vertices;
   if (!scene.stretching->experiment.empty()) {
     const auto comparison = compare(result, read_experiment(scene.stretching->experiment));

@@ -66,6 +66,8 @@ void EnergyBalance::sample(double elastic_fJ) {
   ++samples_;
 }
 
+double EnergyBalance::largest_fJ() const { return largest_term(totals_); }
+
 std::optional<double> EnergyBalance::imbalance() const {
   const EnergyTotals& t = totals_;
   const double in = t.boundaries + t.gradient;

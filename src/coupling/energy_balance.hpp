@@ -31,6 +31,8 @@ class EnergyBalance {
   void sample(double elastic_fJ);
 
   const EnergyTotals& totals() const { return totals_; }
+  /// The largest term of the whole balance, fJ.
+  double largest_fJ() const;
   /// What is not accounted for, over the largest term. None before there are two samples, or where nothing moves.
   std::optional<double> imbalance() const;
   /// The part of it between fluid and membranes: the work of tractions against what the membranes stored and dissipated.

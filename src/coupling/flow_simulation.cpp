@@ -25,13 +25,16 @@ FluidSettings fluid_settings(const Case& scene) {
   FluidSettings settings = *scene.fluid;
   if (scene.coupling && !scene.cells.empty() && scene.coupling->scheme == CouplingSettings::Scheme::iterated)
     settings.momentum_tolerance = std::min(settings.momentum_tolerance, 1e-6 * scene.coupling->tolerance);
+  // A pressure that follows within the step pushes a light membrane back harder than a staggered coupling anticipates: with
+  // repeated projections cells of 1 to 100 pg in the tube swung and broke within 25 steps, at any step from 0.05 to 50 us.
+  if (!scene.cells.empty()) settings.repeat_projection = false;
   return settings;
 }
 
 }  // namespace
 
 FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers)
-    : timers_(timers), schedule_(scene.time) {
+    : timers_(timers), schedule_(scene.time, sudden_changes(scene.boundaries, scene.time.step_us)) {
   const auto scope = timers_.scope("set-up");
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
   check_prescribed_flow(*grid_, scene.boundaries);

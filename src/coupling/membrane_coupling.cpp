@@ -160,7 +160,7 @@ IteratedCoupling::IteratedCoupling(const Case& scene, FluidSolver& fluid, Timers
   const bool robin_term = uses_robin(*scene.coupling) && scene.coupling->robin_coefficient != 0;
   if (scene.coupling->acceleration.value_or(robin_term ? Acceleration::anderson : Acceleration::aitken) ==
       Acceleration::anderson)
-    anderson_ = std::make_unique<AndersonAcceleration>(vertices, remembered);
+    anderson_ = std::make_unique<AndersonAcceleration>(3 * vertices, remembered);
 }
 
 /// Fluid with the guess of the interface's velocity, membrane with the tractions, compare. With the Robin term a pass
@@ -197,7 +197,7 @@ StepStatistics IteratedCoupling::advance(double time, double dt) {
     if (!std::isfinite(residual)) break;
     if (residual <= coupling.tolerance) return statistics;
     if (anderson_) {
-      anderson_->advance(v_interface_, residual_);
+      anderson_->advance(flat(v_interface_), flat(residual_));
       continue;
     }
     if (k > 0 && norms.change > 0)

@@ -1,7 +1,7 @@
 // Membranes that cut the grid, coupled to the flow once a step or by iteration.
 #pragma once
 
-#include "coupling/anderson.hpp"
+#include "core/anderson.hpp"
 #include "coupling/sharp_coupling.hpp"
 
 namespace corpuscle {

@@ -167,7 +167,9 @@ void FluidSolver::begin_step(double dt) {
     if (settings_.convection == FluidSettings::Convection::extrapolated) Kokkos::deep_copy(work_, u_);
   }
   ++history_levels_;
-  statistics_ = {0, 0, 0, 0, statistics_.reference_speed, 0};
+  const double reference_speed = statistics_.reference_speed;
+  statistics_ = {};
+  statistics_.reference_speed = reference_speed;
 }
 
 void FluidSolver::assemble_history(double time) {
@@ -307,6 +309,15 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   complete_velocity(bodies);
 }
 
+/// @param residual  of the momentum equation with the present velocity and pressure, over the velocity
+void FluidSolver::solve_and_project(const EmbeddedBodies* bodies, double residual) {
+  solve_momentum(bodies, residual);
+  statistics_.reference_speed =
+      larger(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
+  project(bodies);
+  ++statistics_.projections;
+}
+
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   update_momentum_cycle();
   assemble_history(time);
@@ -320,10 +331,8 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
         "velocity: {} in the flow field. Likely cause: a diverging run, with convection most often a step too long, longer than the "
         "flow takes across a cell; reduce time.step_us, or set fluid.convection = \"implicit\"",
         std::isfinite(residual) ? "senselessly large numbers" : "not a number"));
-  solve_momentum(bodies, residual);
-  statistics_.reference_speed =
-      larger(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
-  project(bodies);
+  solve_and_project(bodies, residual);
+  if (settings_.repeat_projection) repeat_projection(bodies);
   ++statistics_.solves;
   grid_->halo().exchange(p_);
   if (bodies) {

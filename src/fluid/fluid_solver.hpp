@@ -8,6 +8,7 @@
 #include "fluid/embedded.hpp"
 #include "fluid/fluid_state.hpp"
 #include "fluid/momentum.hpp"
+#include "fluid/pressure_acceleration.hpp"
 #include "fluid/pressure_krylov.hpp"
 #include "fluid/pressure_multigrid.hpp"
 
@@ -18,7 +19,7 @@ namespace corpuscle {
 
 /// What one step needed and how well it did.
 struct FluidStatistics {
-  int momentum_iterations = 0, pressure_iterations = 0, solves = 0;
+  int momentum_iterations = 0, pressure_iterations = 0, solves = 0, projections = 0;
   double divergence = 0;       // largest net flux out of a fluid cell, um3/us
   double reference_speed = 0;  // um/us: the largest prescribed or computed so far
   double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
@@ -83,7 +84,7 @@ class FluidSolver {
 
   /// Residual of the momentum equation that the last projection left, over the velocity (both 2-norms): the splitting.
   /// Right after solve() only.
-  double splitting() { return momentum_residual(); }
+  double splitting();
 
   /// Owned cells of the multigrid's levels, finest first.
   std::vector<int> multigrid_cells() const;
@@ -102,6 +103,8 @@ class FluidSolver {
   double momentum_residual();
   void solve_momentum(const EmbeddedBodies* bodies, double residual);
   void project(const EmbeddedBodies* bodies);
+  void solve_and_project(const EmbeddedBodies* bodies, double residual);
+  void repeat_projection(const EmbeddedBodies* bodies);
   long cut_off_nodes();
   [[noreturn]] void fail_projection(double before, double target, bool attempted);
   void apply_potential();
@@ -146,7 +149,8 @@ class FluidSolver {
   PressureMask mask_;
   Array<double> relative_viscosity_;  // empty: one viscosity
   ViscousCoefficients g_;
-  double residual_norm_ = 0;
+  double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()
+  std::unique_ptr<PressureAcceleration> acceleration_;  // once a step has needed it
   Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)
   Table<double> body_sums_;
   HostCopy<Table<double>> body_sums_host_;

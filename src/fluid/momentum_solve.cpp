@@ -121,6 +121,7 @@ double FluidSolver::momentum_residual() {
   double squares[2] = {residual_square(), square_of(grid_->index(), u_)};
   grid_->comm().sum(squares, 2);
   residual_norm_ = std::sqrt(squares[0]);
+  velocity_norm_ = std::sqrt(squares[1]);
   const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
   return residual_norm_ / std::sqrt(std::max(squares[1], floor));
 }

@@ -51,6 +51,7 @@ struct FluidSettings {
   double momentum_tolerance = 1e-6;     // relative residual; 1e-5 moves a cell by less than 1e-5 um in 300 us
   double divergence_tolerance = 5e-11;  // face-flux divergence over U h^2
   int max_iterations = 500;             // of either linear solver
+  bool repeat_projection = true;        // no key: see FluidSolver::solve
   Triple pressure_gradient_Pa_per_um{}; // imposed on periodic directions, in Pa/um; drives the flow along -gradient
 
   bool operator==(const FluidSettings&) const = default;

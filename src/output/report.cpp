@@ -80,12 +80,14 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["peak_rss_mb_largest_rank"] = comm.max(peak_rss_mb());
   json["iterations"] = {{"momentum", to_json(report.momentum_iterations)},
                         {"pressure", to_json(report.pressure_iterations)},
+                        {"projections", to_json(report.projections)},
                         {"coupling", to_json(report.coupling_iterations)},
                         {"membrane_substeps", to_json(report.membrane_substeps)}};
   json["errors"] = report.errors;
   for (const char* name :
        {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
     if (!json["errors"].contains(name)) json["errors"][name] = nullptr;
+  json["warnings"] = report.warnings;
   json["quantities"] = report.quantities;
   if (!report.error_bars.empty()) json["error_bars"] = report.error_bars;
   const auto path = (std::filesystem::path(folder) / "report.json").string();

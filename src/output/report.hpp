@@ -32,9 +32,11 @@ struct Report {
   double simulated_us = 0;
   double wall_s = 0;
   std::map<std::string, double> wall_s_by_part;  // of this rank; all ranks have the same parts
-  Tally momentum_iterations, pressure_iterations, coupling_iterations, membrane_substeps;
+  Tally momentum_iterations, pressure_iterations, projections, coupling_iterations, membrane_substeps;
   /// Error measures by name; those of the contract that a run does not have are written as null.
   nlohmann::json errors = nlohmann::json::object();
+  /// Of those that are bad: figure, value, level, key, message.
+  nlohmann::json warnings = nlohmann::json::array();
   /// What the run is about, at its end, by names that carry the unit; and how far off these may be, where estimated.
   std::map<std::string, double> quantities, error_bars;
   /// Further entries of the top level.

@@ -132,6 +132,9 @@ TEST_CASE("a restart goes on with the same bits") {
   SECTION("cell, steps that grow") {
     require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.0625"}, true);
   }
+  SECTION("cell, steps that are short again after the end of the inlet's ramp") {
+    require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.25", "boundary.0.ramp_us=4"}, true);
+  }
   SECTION("cell, iterated coupling") {
     require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=iterated"}, true);
   }

@@ -1,19 +1,19 @@
-#include "coupling/anderson.hpp"
+#include "core/anderson.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace corpuscle {
 
-AndersonAcceleration::AndersonAcceleration(int vertices, int depth)
-    : vertices_(vertices),
-      depth_(depth),
-      differences_{Components<double>("corpuscle::coupling::residual_differences", 3 * vertices, depth),
-                   Components<double>("corpuscle::coupling::iterate_differences", 3 * vertices, depth)},
-      previous_guess_("corpuscle::coupling::previous_guess", vertices, 3),
-      previous_residual_("corpuscle::coupling::previous_residual", vertices, 3),
-      products_("corpuscle::coupling::products", 2 * depth),
-      weight_("corpuscle::coupling::weight", depth),
+AndersonAcceleration::AndersonAcceleration(int entries, int depth, std::function<void(double*, int)> sum)
+    : depth_(depth),
+      sum_(std::move(sum)),
+      differences_{Components<double>("corpuscle::acceleration::residual_differences", entries, depth),
+                   Components<double>("corpuscle::acceleration::iterate_differences", entries, depth)},
+      previous_guess_("corpuscle::acceleration::previous_guess", entries),
+      previous_residual_("corpuscle::acceleration::previous_residual", entries),
+      products_("corpuscle::acceleration::products", 2 * depth),
+      weight_("corpuscle::acceleration::weight", depth),
       products_host_(Kokkos::create_mirror_view(products_)),
       weight_host_(Kokkos::create_mirror_view(weight_)),
       gram_(depth * depth),
@@ -51,14 +51,15 @@ std::vector<double> AndersonAcceleration::weights(int columns) const {
   return result;
 }
 
-void AndersonAcceleration::advance(const Components<double>& guess, const Components<double>& residual) {
+void AndersonAcceleration::advance(const Array<double>& guess, const Array<double>& residual) {
   const int column = recorded_ >= 0 ? recorded_ % depth_ : -1;
-  record_differences(vertices_, column, differences_, guess, residual, previous_guess_, previous_residual_);
+  record_differences(column, differences_, guess, residual, previous_guess_, previous_residual_);
   ++recorded_;
   const int columns = std::min(recorded_, depth_);
   if (columns > 0) {
-    difference_products(vertices_, columns, column, differences_.residual, residual, products_);
+    difference_products(columns, column, differences_.residual, residual, products_);
     Kokkos::deep_copy(products_host_, products_);
+    if (sum_) sum_(products_host_.data(), 2 * columns);
     for (int c = 0; c < columns; ++c) {
       gram_[c * depth_ + column] = gram_[column * depth_ + c] = products_host_(c);
       right_[c] = products_host_(c + columns);
@@ -67,7 +68,7 @@ void AndersonAcceleration::advance(const Components<double>& guess, const Compon
     std::copy(weight.begin(), weight.end(), weight_host_.data());
     Kokkos::deep_copy(weight_, weight_host_);
   }
-  combine_differences(vertices_, columns, weight_, differences_.iterate, residual, guess);
+  combine_differences(columns, weight_, differences_.iterate, residual, guess);
 }
 
 }  // namespace corpuscle

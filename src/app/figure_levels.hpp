@@ -1,0 +1,21 @@
+// Which of a report's error figures are so bad that a run must not pass them over, and what helps.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+namespace corpuscle {
+
+/// What some figures are shares of. Where that is next to nothing, they say nothing.
+struct FigureScales {
+  double speed_um_per_us = 0;  // the largest so far
+  double energy_fJ = 0;        // the largest term of the energy balance
+  bool convection_left_out = false;
+};
+
+/// The warnings of a report, an array: each has the `figure`, its `value`, the `level`, the `key` of the case file that
+/// helps, and the `message` for the screen with all of them.
+/// @param errors  Report::errors, by name; figures that are missing or null are passed over, those that are not a number
+///                are bad
+nlohmann::json judge(const nlohmann::json& errors, const FigureScales& scales);
+
+}  // namespace corpuscle

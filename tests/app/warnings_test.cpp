@@ -1,0 +1,115 @@
+// Error figures that are bad are said so, with the key that helps; good runs are left in peace.
+#include <cmath>
+
+#include "app/figure_levels.hpp"
+#include "program.hpp"
+
+using namespace app;
+using namespace corpuscle;
+using Catch::Contains;
+
+namespace {
+
+Words figures_of(const nlohmann::json& warnings) {
+  Words names;
+  for (const auto& w : warnings) names.push_back(w["figure"]);
+  return names;
+}
+
+const FigureScales moving{2e-3, 10, false};
+
+/// A tube of 10 um with a held sphere of 0.7 of its diameter, on 13 x 13 x 17 nodes.
+const char* tight_sphere = R"([time]
+step_us = 4
+end_us = 16
+[grid]
+generator = "straight_tube"
+nodes = [13, 13, 17]
+diameter_um = 10
+length_um = 24
+[fluid]
+convection = false
+[[boundary]]
+side = "k_min"
+type = "velocity_inlet"
+velocity_mm_per_s = 1
+profile = "parabolic"
+[[boundary]]
+side = "k_max"
+type = "outflow"
+[[boundary]]
+side = "i_min"
+type = "wall"
+[[boundary]]
+side = "i_max"
+type = "wall"
+[[boundary]]
+side = "j_min"
+type = "wall"
+[[boundary]]
+side = "j_max"
+type = "wall"
+[[bodies]]
+shape = "sphere"
+radius_um = 3.5
+center_um = [0, 0, 0]
+)";
+
+}  // namespace
+
+TEST_CASE("bad figures become warnings with their key, good ones do not") {
+  const nlohmann::json bad = {{"slip", 0.26}, {"energy_balance", 0.4}, {"flux_correction", 1.0}, {"splitting", 0.01},
+                              {"max_divergence", 7e-11}, {"coupling_residual", nullptr}};
+  const auto warnings = judge(bad, moving);
+  CHECK(figures_of(warnings) == Words{"flux_correction", "splitting", "slip", "energy_balance"});
+  CHECK(warnings[1]["key"] == "time.step_us");
+  CHECK(warnings[1]["value"] == 0.01);
+  CHECK_THAT(warnings[2]["message"].get<std::string>(), Contains("slip = 0.26, more than 0.15") && Contains("grid.nodes"));
+  // The tube with a cell at 400 us, and the poorest of the good runs of a held sphere.
+  const nlohmann::json good = {{"area_drift", 0.0064}, {"coupling_residual", 0.03}, {"energy_balance", 0.012}, {"energy_balance_coupling", 0.003},
+                               {"flux_correction", 0.0022}, {"max_divergence", 7.2e-11}, {"slip", 0.11}, {"splitting", 4e-4},
+                               {"volume_drift", 1.2e-6}, {"least_wall_spacings", 3.1}, {"traction_fallbacks", 0.0}};
+  CHECK(judge(good, moving).empty());
+  CHECK(figures_of(judge({{"least_body_spacings", 1.2}}, moving)) == Words{"least_body_spacings"});
+  CHECK(figures_of(judge({{"slip", std::nan("")}}, moving)) == Words{"slip"});
+}
+
+TEST_CASE("a share of nothing is no warning") {
+  const nlohmann::json still = {{"slip", 0.5}, {"energy_balance", 0.9}, {"flux_correction", 1.0}, {"splitting", 0.3},
+                                {"convection_over_viscosity", 0.2}};
+  CHECK(judge(still, {0, 0, false}).empty());
+  CHECK(figures_of(judge(still, {0, 0, true})) == Words{"convection_over_viscosity"});
+}
+
+TEST_CASE("a held sphere on a grid too coarse for its gap warns, on the screen and in the report") {
+  const auto folder = fresh_folder("warnings");
+  std::ofstream(folder / "tight.toml") << tight_sphere;
+  const auto outcome = succeed(folder, {"run", "tight.toml", "--out", "out", "--set", "output.fields=false"});
+  const auto r = report(folder / "out");
+  const auto names = figures_of(r["warnings"]);
+  REQUIRE(std::count(names.begin(), names.end(), "slip") == 1);
+  REQUIRE(std::count(names.begin(), names.end(), "least_wall_spacings") == 1);
+  for (const auto& w : r["warnings"]) {
+    const std::string message = w["message"];
+    INFO(message);
+    CHECK_THAT(message, Contains(w["key"].get<std::string>()));
+    std::string screen = outcome.output;
+    CHECK_THAT(screen, Contains(message));
+    screen.erase(0, screen.find(message) + 1);
+    CHECK_THAT(screen, !Contains(message));  // once
+  }
+  // The force is the momentum balance's, with that of the tractions beside it.
+  const auto h = history(folder / "out");
+  const auto last = h.lines.size() - 1;
+  CHECK(r["quantities"]["body_0_force_z_nN"] == Approx(h.number(last, "balance_force_z_nN")));
+  CHECK(r["quantities"]["body_0_traction_force_z_nN"] == Approx(h.number(last, "force_z_nN")));
+}
+
+TEST_CASE("a coarse tube with a cell has nothing to warn of but its coarseness") {
+  const auto folder = fresh_folder("no_warnings");
+  succeed(folder, coarse_tube("out", {"time.end_us=30"}));
+  for (const auto& w : report(folder / "out")["warnings"]) {
+    INFO(w["message"].get<std::string>());
+    CHECK(w["key"] == "grid.nodes");
+  }
+}
