@@ -54,11 +54,12 @@ constexpr FigureLevel levels[] = {
     {"coupling_residual", 0.5, false, Of::speed, "time.step_us",
      "the velocity of the membrane changes by that share of itself in a step, on average: reduce time.step_us, set "
      "time.first_step_us, or use coupling.scheme = \"iterated\""},
-    // 0.001 to 0.04 in good runs; work that is not accounted for is an error of the forces.
-    {"energy_balance", 0.1, false, Of::energy, "time.step_us",
+    // 0.001 to 0.04 in good runs, 0.2 where a cell is set in motion and little is dissipated (20 us of uniform flow); work that
+    // is not accounted for is an error of the forces.
+    {"energy_balance", 0.3, false, Of::energy, "time.step_us",
      "that share of the work done is not accounted for: reduce time.step_us or refine grid.nodes; if history_every_us is many steps, lower "
      "output.history_every_us first, at whose samples the work is added up"},
-    {"energy_balance_coupling", 0.1, false, Of::energy, "time.step_us",
+    {"energy_balance_coupling", 0.3, false, Of::energy, "time.step_us",
      "that share of the work between fluid and membranes is not accounted for: reduce time.step_us or refine grid.nodes; if "
      "history_every_us is many steps, lower output.history_every_us first"},
     // The error that leaving it out makes is of this order.
