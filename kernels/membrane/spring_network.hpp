@@ -1,6 +1,7 @@
 // In-plane elasticity from springs along the edges, of any law.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "membrane/triangle_shape.hpp"
 
 namespace corpuscle {
@@ -16,8 +17,7 @@ struct SpringNetwork {
   KOKKOS_INLINE_FUNCTION double strain(const TriangleShape& s, const TriangleRest& rest) const {
     double largest = 0;
     for (int k = 0; k < 3; ++k) {
-      const double x = spring.strain(s.length[k], rest.length[k]);
-      largest = x < 1e300 ? (x > largest ? x : largest) : 1e300;
+      largest = larger(largest, spring.strain(s.length[k], rest.length[k]));
     }
     return largest;
   }

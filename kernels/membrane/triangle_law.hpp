@@ -38,7 +38,7 @@ struct TriangleLaw {
   KOKKOS_INLINE_FUNCTION static double largest_stretch(double trace, double ratio) {
     const double difference = 0.25 * trace * trace - ratio * ratio;
     const double square = 0.5 * trace + std::sqrt(difference > 0 ? difference : 0);
-    return square < 1e300 ? std::sqrt(square) : 1e300;
+    return std::sqrt(square);
   }
   KOKKOS_INLINE_FUNCTION double strain(const TriangleShape& s, const TriangleRest& rest) const {
     double weight[3];
