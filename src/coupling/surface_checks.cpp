@@ -108,12 +108,12 @@ std::string finer_nodes(const GridSettings& grid, const Resolution& r, double fa
 
 /// Typical spacing over thickness of which to warn, and which to refuse. Of cells: in the tube of 10 um, from two places
 /// between the nodes, the rear hollow after 400 us comes to 1.17 and 1.20 um with nodes 1.9 um apart along the axis, to 1.13
-/// and 1.23 um with 2.8 um, to 1.03 and 1.26 um with 3.75 um, where the speed swings by 10 %; 1.19 um is right. A cell is
-/// about 2 um thick. A sphere has four nodes across, or less than one and a half.
+/// and 1.23 um with 2.8 um, to 1.03 and 1.26 um with 3.75 um, where the speed swings by 10 %; 1.19 um is right. Ratios
+/// of 0.7, 1.0 and 1.4. A sphere has four nodes across, or less than one and a half.
 struct Limits {
   double coarse, hopeless;
 };
-constexpr Limits cell_limits{1.0, 1.6}, body_limits{0.25, 0.7};
+constexpr Limits cell_limits{0.8, 1.2}, body_limits{0.25, 0.7};
 
 /// @returns the warning, or ""
 std::string check_resolution(const std::string& name, const GridSettings& grid, const Resolution& r, const Limits& limits) {
