@@ -16,6 +16,8 @@ const double pi = std::acos(-1.0);
 struct Outcome {
   EnergyTotals totals;
   double imbalance = 0, coupling = 0, driving_pressure_kPa = 0;
+  double last_dissipation_nW = 0;  // mean over the last step
+  double torque_z = 0;             // on the first rigid body in the end, nN um
 };
 
 /// Sampled after every step.
@@ -30,13 +32,21 @@ Outcome run(const Case& scene) {
     return energy;
   };
   balance.sample(elastic());
+  Outcome outcome;
   while (!simulation.done()) {
+    const double before = balance.totals().dissipation;
     simulation.step();
     if (simulation.immersed() && !simulation.membranes()) simulation.immersed()->tractions();
     balance.sample(elastic());
+    outcome.last_dissipation_nW = (balance.totals().dissipation - before) / simulation.last_step_us();
   }
-  return {balance.totals(), balance.imbalance().value(), balance.coupling_imbalance().value(),
-          balance.driving_pressure_kPa()};
+  if (auto* bodies = simulation.rigid_bodies())
+    outcome.torque_z = simulation.immersed()->loads({bodies->centre(0)})[0][1][2];
+  outcome.totals = balance.totals();
+  outcome.imbalance = balance.imbalance().value();
+  outcome.coupling = balance.coupling_imbalance().value();
+  outcome.driving_pressure_kPa = balance.driving_pressure_kPa();
+  return outcome;
 }
 
 Case tube(int n, int nk, FluidSettings::Convection convection) {
@@ -103,21 +113,51 @@ TEST_CASE("the work of a pressure gradient on an array of spheres is dissipated 
   CHECK(imbalance[1] < 0.35 * imbalance[0]);  // order 1.5
 }
 
-TEST_CASE("the work of spheres that move or turn is dissipated around them", "[coupling][energy]") {
-  const auto [velocity, turning] = GENERATE(std::pair{Triple{2e-3, 0, 0}, Triple{}}, std::pair{Triple{}, Triple{0, 0, 1e-3}});
-  std::vector<double> imbalance;
+TEST_CASE("the work of a sphere that moves in a box is dissipated around it", "[coupling][energy]") {
+  std::vector<double> imbalance, dissipation;
   for (const int cells : {19, 38}) {
     Case scene = box_with_sphere(cells);
     scene.time = {1, 30};
     scene.boundaries = scenes::sides(BoundarySettings::Type::wall);
-    scene.bodies[0].velocity_um_per_us = velocity;
-    scene.bodies[0].angular_velocity_rad_per_us = turning;
+    scene.bodies[0].velocity_um_per_us = {2e-3, 0, 0};
     const Outcome outcome = run(scene);
     imbalance.push_back(outcome.imbalance);
-    CHECK(outcome.totals.on_bodies < 0);  // they drive the flow
+    dissipation.push_back(outcome.totals.dissipation);
+    CHECK(outcome.totals.on_bodies < 0);  // it drives the flow
   }
   INFO(fmt::format("imbalance {:.4f} at 12 nodes a diameter, {:.4f} at 24", imbalance[0], imbalance[1]));
-  CHECK(imbalance[0] < 0.2);
+  // Tractions are 10 and 2.5 % low there, and dissipation misses about as much in the cells that the surface cuts: what is
+  // left is their difference.
+  CHECK(imbalance[0] < 0.07);
+  CHECK(imbalance[1] < 0.01);
+  CHECK(dissipation[0] == Approx(dissipation[1]).epsilon(0.17));
+}
+
+TEST_CASE("the work of an array of spheres that turn is dissipated around them, and their torque is the exact one",
+          "[coupling][energy]") {
+  // Spheres of a simple cubic array that turn alike, with no mean vorticity: 8 pi mu a^3 Omega / (1 - phi) at the solid
+  // fraction phi, up to the power 10/3 of phi (Zuzovsky, Adler and Brenner, Phys. Fluids 26, 1983), which is 0.1 % here.
+  constexpr double rate = 1e-3, radius = 5, side = 16;
+  const double phi = 4 * pi / 3 * std::pow(radius / side, 3), exact = 8 * pi * 1.1 * std::pow(radius, 3) * rate / (1 - phi);
+  std::vector<double> imbalance, torque, dissipation;
+  for (const int cells : {19, 38}) {
+    Case scene = box_with_sphere(cells);
+    scene.time = {1, 25};
+    scene.boundaries = scenes::sides(BoundarySettings::Type::periodic);
+    scene.bodies[0].angular_velocity_rad_per_us = {0, 0, rate};
+    const Outcome outcome = run(scene);
+    imbalance.push_back(outcome.imbalance);
+    torque.push_back(-outcome.torque_z / exact);
+    dissipation.push_back(outcome.last_dissipation_nW / (exact * rate));
+    CHECK(outcome.totals.on_bodies < 0);
+  }
+  INFO(fmt::format("at 12 and 24 nodes a diameter: imbalance {:.4f}, {:.4f}; torque {:.4f}, {:.4f} and dissipation {:.4f}, {:.4f} of the exact ones",
+                   imbalance[0], imbalance[1], torque[0], torque[1], dissipation[0], dissipation[1]));
+  CHECK(torque[0] == Approx(1).margin(0.14));  // second order: measured 13 and 7.5 % low at 12 and 16 nodes a diameter
+  CHECK(torque[1] == Approx(1).margin(0.05));
+  CHECK(dissipation[0] == Approx(1).margin(0.04));  // 2.8 and 2.3 % low
+  CHECK(dissipation[1] == Approx(1).margin(0.03));
+  CHECK(imbalance[0] < 0.13);  // the torque's error, nearly
   CHECK(imbalance[1] < 0.35 * imbalance[0]);
 }
 
@@ -136,17 +176,23 @@ TEST_CASE("the surface part of the dissipation of a turning sphere is exact", "[
 
 TEST_CASE("the energy of a cell in a tube balances, the better the shorter the step", "[coupling][energy]") {
   std::vector<Outcome> outcomes;
-  for (const double step : {2.0, 0.5}) {
-    Case scene = scenes::tube_with_cell(17, 25, 100, CouplingSettings::Scheme::robin, 60);
+  for (const double step : {1.0, 0.5}) {
+    Case scene = scenes::tube_with_cell(17, 25, 100, CouplingSettings::Scheme::robin, 40);
     scene.time.step_us = step;
     scene.cells[0].membrane_viscosity_N_s_per_m = 5.8e-9;
     outcomes.push_back(run(scene));
   }
-  INFO(fmt::format("imbalance {:.4f} at 2 us, {:.4f} at 0.5 us; between fluid and cell {:.4f} and {:.4f}",
+  INFO(fmt::format("imbalance {:.4f} at 1 us, {:.4f} at 0.5 us; between fluid and cell {:.4f} and {:.4f}",
                    outcomes[0].imbalance, outcomes[1].imbalance, outcomes[0].coupling, outcomes[1].coupling));
-  CHECK(outcomes[0].imbalance < 0.05);
-  CHECK(outcomes[1].imbalance < 0.05);  // 1.7 spacings beside the cell
-  CHECK(outcomes[1].coupling < 0.5 * outcomes[0].coupling);
+  // Of it 2.7 and 1.3 % are between fluid and cell; the rest is friction that the fluid misses in the cells that the surface
+  // cuts, 1 % on this grid with 1.7 spacings beside the cell.
+  CHECK(outcomes[0].imbalance < 0.045);
+  CHECK(outcomes[1].imbalance < 0.03);
+  for (const Outcome& outcome : outcomes) CHECK(std::abs(outcome.imbalance - outcome.coupling) < 0.02);
+  // Between fluid and cell the balance is first order in the step. What is left at no step at all is below each of the
+  // membrane's own terms, of 0.0015 to 0.002.
+  CHECK(outcomes[1].coupling < 0.6 * outcomes[0].coupling);
+  CHECK(std::abs(2 * outcomes[1].coupling - outcomes[0].coupling) < 0.001);
   CHECK(outcomes[0].totals.membrane_dissipation > 0);
 }
 
