@@ -14,7 +14,7 @@ void reduce_owned(const char* label, const IndexSpace& index, const Body& body, 
   Kokkos::parallel_reduce(
       label, Policy(0, index.owned()),
       KOKKOS_LAMBDA(int e, Value& value) {
-        body(e % index.n[0], (e / index.n[0]) % index.n[1], e / (index.n[0] * index.n[1]), value);
+        index.visit_compact(e, body, value);
       },
       reducer);
 }
