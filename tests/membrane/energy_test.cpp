@@ -35,7 +35,7 @@ TEST_CASE("a membrane's dissipation is the power of its dissipative forces") {
   const auto v = rough_velocity(m.vertices());
   to_device(v, m.surfaces().v);
   const Components<double> force("corpuscle::test::force", m.vertices(), 3);
-  m.viscosity()->force(m.views(), m.surfaces().v, force);
+  m.viscosity()->force(m.views(), m.elasticity(), m.surfaces().v, force);
   double power = 0;
   const auto f = to_host(force, m.vertices());
   for (int i = 0; i < m.vertices(); ++i) power -= dot(f[i], v[i]);
