@@ -61,6 +61,7 @@ void require_same_after_restart(const fs::path& folder, const std::string& name,
   };
   succeed(folder, words("whole", "time.end_us=12"));
   succeed(folder, words("parts", "time.end_us=6"));
+  fs::copy_file(folder / "parts/checkpoint.h5", folder / "half.h5");
   auto second = words("parts", "time.end_us=12");
   second.insert(second.end(), {"--restart", "parts/checkpoint.h5"});
   succeed(folder, second);
@@ -143,7 +144,7 @@ TEST_CASE("a restart goes on with the same bits") {
         folder, scene("straight_tube"),
         {"coupling.scheme=iterated", "coupling.acceleration=aitken", "coupling.robin_in_iterated=false", "cells.0.mass_pg=30"}, true);
     // A step starts from the factor of the one before, 0.05 here, or from a half where that was larger: then nothing would show.
-    CHECK(data_set(folder / "whole/checkpoint.h5", "coupling")[0] < 0.5);
+    CHECK(data_set(folder / "half.h5", "coupling")[0] < 0.5);
   }
 }
 
