@@ -49,7 +49,7 @@ TriangleMesh read_closed_surface(const std::string& path, FileSurface& result) {
   if (file.parts.size() > 1) result.notes.push_back(fmt::format("its {} solids form one surface", file.parts.size()));
   const std::size_t turned = orient_outward(file.mesh);
   if (turned == file.mesh.triangles.size())
-    result.notes.push_back("its triangles faced inward: all are turned");
+    result.notes.emplace_back("its triangles faced inward: all are turned");
   else if (turned > 0)
     result.notes.push_back(fmt::format("{} of its {} triangles faced inward and are turned", turned, file.mesh.triangles.size()));
   check_closed_surface(file.mesh, path);
@@ -135,7 +135,7 @@ FileSurface read_cell_surface(const CellSettings& cell) {
                                      text(s.centroid_um)));
   }
   if (!s.disc) {
-    s.notes.push_back("it is not flat in one direction: the file's z is taken as the axis of the cell");
+    s.notes.emplace_back("it is not flat in one direction: the file's z is taken as the axis of the cell");
   } else if (angle > upright && cell.align) {
     s.mesh = turn_to_z(s.mesh, s.axis, {});
     s.warnings.push_back(fmt::format("it is a disc whose axis {} is {:.0f} degrees from the file's z: turned about the origin so "
