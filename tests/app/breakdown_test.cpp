@@ -48,3 +48,17 @@ TEST_CASE("a cell carried out of the grid: the last good checkpoint is named, an
   WARN("skipped: going on from the checkpoint, because this build has no HDF5");
 #endif
 }
+
+TEST_CASE("a run that breaks down on a grid too coarse for its cell names the grid, one on a fine grid does not") {
+  const auto run = [](const std::string& nodes) {
+    return coarse_tube("out", {"grid.nodes=" + nodes, "time.end_us=60", "boundary.0.velocity_mm_per_s=60", "boundary.0.ramp_us=1",
+                               "output.fields=false"});
+  };
+  const Words cause{"computation broke down", "the area of cells.0"};
+  Words coarse = cause;
+  coarse.insert(coarse.end(), {"But first: cells.0: the grid is too coarse", "spacing over thickness", "grid.nodes = [17, 17, "});
+  const auto folder = fresh_folder("coarse");
+  fail(folder, run("[17,17,17]"), 3, coarse);
+  const auto fine = fail(folder, run("[17,17,41]"), 3, cause);
+  REQUIRE(fine.output.find("too coarse for it") == std::string::npos);
+}
