@@ -93,11 +93,12 @@ def not_finite(folder):
     for name in ("cells.h5", "fields.h5"):
         if not (folder / name).exists():
             continue
-        found = []
         try:
-            with h5py.File(folder / name) as file:
-                file.visititems(lambda path, item: found.append(path) if isinstance(item, h5py.Dataset)
-                                and item.dtype.kind == "f" and not np.isfinite(item[()]).all() else None)
+            with h5py.File(folder / name) as file:  # whose entries are links to other files, which visititems() passes by
+                arrays = [(path, item) for path, item in file.items() if isinstance(item, h5py.Dataset)]
+                arrays += [(f"{path}/{inner}", item) for path, group in file.items() if isinstance(group, h5py.Group)
+                           for inner, item in group.items()]
+                found = [path for path, item in arrays if item.dtype.kind == "f" and not np.isfinite(item[()]).all()]
         except OSError as error:
             return f"{name} cannot be read ({error})"
         if found:
@@ -115,7 +116,7 @@ def fault(setup, run):
     """Why a run is wrong whatever its accuracy, or None."""
     if run.code is None:
         return run.message or "time-out"
-    if run.code not in (0, 2, 3):
+    if run.code not in (0, 2, 3, 5):
         return f"exit code {run.code}"
     bad = not_finite(run.folder)
     history = run.folder / "history.csv"    # read as text: empty fields are columns that a run does not have

@@ -105,8 +105,16 @@ struct Lattice {
     return Located::failed;
   }
 
-  /// Same bits on every rank that holds the lattice cell of `q`, whatever the start of the search was.
+  /// Same bits on every rank that holds the lattice cell of `q`, whatever the start of the search was: a point on a face
+  /// between two cells, which a search may end in either of, belongs to the upper one.
   KOKKOS_INLINE_FUNCTION void polish(const Vec3& p, LatticePoint& q) const {
+    constexpr double on_face = 1e-9;
+    for (int d = 0; d < 3; ++d) {
+      int up = q.f[d] >= 1 - on_face ? 1 : (q.f[d] < -on_face ? -1 : 0);
+      if (q.base[d] + up < lower[d] || q.base[d] + up > upper[d] - 1) up = 0;
+      q.base[d] += up;
+      q.f[d] -= up;
+    }
     LatticePoint s = q;
     for (int d = 0; d < 3; ++d) s.f[d] = 0.5;
     for (int iteration = 0; iteration < 12; ++iteration) {

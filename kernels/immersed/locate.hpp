@@ -9,6 +9,8 @@ namespace corpuscle {
 struct LocateOptions {
   bool warm = false;        // xi holds the positions of an earlier call
   bool wall[6] = {};        // i_min, i_max, ... : sides whose distance is reported
+  bool outflow[6] = {};     // sides whose distance from the first `travellers` vertices is reported
+  int travellers = 0;
   Vec3 lower, upper;        // bounds of the lattice in space, with a margin
   double band_links = 1.1;  // half-width of the band in link lengths
 };
@@ -21,7 +23,7 @@ inline void reset_places(const SurfaceSet& s, const PlaceViews& places) {
       "corpuscle::immersed::reset_boxes", Policy(0, static_cast<int>(box.extent(0))),
       KOKKOS_LAMBDA(int e) { box(e) = e % 6 < 3 ? 1 << 28 : -(1 << 28); });
   Kokkos::parallel_for(
-      "corpuscle::immersed::reset_findings", Policy(0, 3), KOKKOS_LAMBDA(int e) { found(e) = e == 2 ? 0 : no_key; });
+      "corpuscle::immersed::reset_findings", Policy(0, 4), KOKKOS_LAMBDA(int e) { found(e) = e == 2 ? 0 : no_key; });
   Kokkos::deep_copy(Exec(), places.image, -1);
   static_cast<void>(s);
 }
@@ -117,9 +119,10 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
           }
           for (int side = 0; side < 6; ++side) {
             const bool here = side % 2 == 0 ? lattice.boundary_below[side / 2] : lattice.boundary_above[side / 2];
-            if (!here || !options.wall[side] || !owned) continue;
-            const double gap = spacings_to_side(lattice, xi, side);
-            Kokkos::atomic_fetch_min(&out.found(1), pack_key(gap > 0 ? gap : 0, static_cast<unsigned>(v)));
+            const bool leaves = options.outflow[side] && v < options.travellers;
+            if (!here || !owned || !(options.wall[side] || leaves)) continue;
+            const double gap = spacings_to_side(lattice, xi, side), length = leaves ? gap * norm(tangent[side / 2]) : gap;
+            Kokkos::atomic_fetch_min(&out.found(leaves ? 3 : 1), pack_key(length > 0 ? length : 0, static_cast<unsigned>(v)));
           }
           grow_box(out.box, 0, xi, pad);
           grow_box(out.box, 6 * (1 + body(v)), xi, pad);

@@ -31,11 +31,20 @@ std::vector<std::int32_t> to_int32(const Table<int>& table) {
 }
 #endif
 
+/// Share of the surfaces' vertices whose last traction did not come from a full fit.
+/// @param fits  how many came about in which way, by TractionFallback
+double poor_share(const std::vector<long>& fits) {
+  long all = 0, poor = 0;
+  for (int how = traction_fitted; how <= traction_nothing; ++how) all += fits[how];
+  for (int how : {traction_gradient, traction_normal, traction_nothing, pressure_average, pressure_nothing}) poor += fits[how];
+  return all > 0 ? static_cast<double>(poor) / static_cast<double>(all) : 0;
+}
+
 }  // namespace
 
 FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
-                       std::optional<double> restart_us)
-    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us),
+                       std::optional<double> restart_us, std::chrono::steady_clock::time_point start)
+    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us), start_(start),
       energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   HistoryColumns columns;
@@ -64,7 +73,7 @@ FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulat
 
 /// Whether this step is the last, or the first at or after a multiple of `every_us`.
 bool FlowOutput::due(double every_us) const {
-  if (simulation_.done()) return true;
+  if (simulation_.done() || simulation_.at_outflow()) return true;
   if (every_us <= 0) return false;
   const double step = simulation_.last_step_us(), now = simulation_.time();
   return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
@@ -72,17 +81,17 @@ bool FlowOutput::due(double every_us) const {
 
 void FlowOutput::gather() {
   const auto& fluid = simulation_.fluid().statistics();
-  momentum_.add(fluid.momentum_iterations);
-  pressure_.add(fluid.pressure_iterations);
-  projections_.add(fluid.projections);
+  totals_.momentum.add(fluid.momentum_iterations);
+  totals_.pressure.add(fluid.pressure_iterations);
+  totals_.projections.add(fluid.projections);
   const double spacing = simulation_.grid().mean_spacing();
   if (fluid.reference_speed > 0)
-    divergence_ = larger(divergence_, fluid.divergence / (fluid.reference_speed * spacing * spacing));
-  flux_correction_ = larger(flux_correction_, fluid.flux_correction);
+    totals_.divergence = larger(totals_.divergence, fluid.divergence / (fluid.reference_speed * spacing * spacing));
+  totals_.flux_correction = larger(totals_.flux_correction, fluid.flux_correction);
   if (!simulation_.membranes()) return;
-  coupling_.add(simulation_.statistics().coupling_iterations);
-  substeps_.add(simulation_.statistics().substeps);
-  residual_.add(simulation_.statistics().coupling_residual);
+  totals_.coupling.add(simulation_.statistics().coupling_iterations);
+  totals_.substeps.add(simulation_.statistics().substeps);
+  totals_.residual.add(simulation_.statistics().coupling_residual);
 }
 
 void FlowOutput::after_step(bool start) {
@@ -93,7 +102,7 @@ void FlowOutput::after_step(bool start) {
     if (history_) write_history();
     energy_.sample(elastic_energy_);
   }
-  if (!start && due(output.every_us)) splitting_ = std::max(splitting_, simulation_.fluid().splitting());
+  if (!start && due(output.every_us)) totals_.splitting = larger(totals_.splitting, simulation_.fluid().splitting());
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -103,9 +112,9 @@ void FlowOutput::after_step(bool start) {
 
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    volume_drift_ = larger(volume_drift_, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
+    totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
     const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
-    area_drift_ = larger(area_drift_, drift);
+    totals_.area_drift = larger(totals_.area_drift, drift);
     if (!(drift <= senseless_area))
       throw ComputationError(fmt::format(
           "membrane: the area of cells.{} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
@@ -137,8 +146,11 @@ HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const 
 }
 
 void FlowOutput::write_history() {
-  const std::size_t shape = shape_columns.size(), balance = balance_columns.size();
-  const double none = std::nan("");
+  measure();
+  for (const auto& sample : last_) history_->write(sample);
+}
+
+void FlowOutput::measure() {
   last_.clear();
   if (auto* membranes = simulation_.membranes()) {
     const auto cells = membranes->diagnostics();
@@ -148,13 +160,15 @@ void FlowOutput::write_history() {
     const auto travelled = simulation_.immersed()->wrapped_by();
     for (int c = 0; c < simulation_.cells(); ++c) {
       auto sample = cell_sample(c, cells[c], travelled[c]);
-      if (simulation_.rigid_bodies()) sample.more.resize(shape + balance, none);
-      history_->write(sample);
+      if (simulation_.rigid_bodies()) sample.more.resize(shape_columns.size() + balance_columns.size(), std::nan(""));
       last_.push_back(sample);
     }
   }
-  auto* bodies = simulation_.rigid_bodies();
-  if (!bodies) return;
+  if (simulation_.rigid_bodies()) measure_bodies();
+}
+
+void FlowOutput::measure_bodies() {
+  const auto* bodies = simulation_.rigid_bodies();
   auto& immersed = *simulation_.immersed();
   simulation_.coupling()->tractions_for_output();
   std::vector<Triple> centre(simulation_.surfaces()->bodies);
@@ -170,9 +184,8 @@ void FlowOutput::write_history() {
     sample.velocity_um_per_us = bodies->velocity(b);
     sample.force_nN = loads[number][0];
     sample.torque_nN_um = loads[number][1];
-    if (simulation_.membranes()) sample.more.assign(shape, none);
+    if (simulation_.membranes()) sample.more.assign(shape_columns.size(), std::nan(""));
     for (double f : balance_force[number]) sample.more.push_back(f);
-    history_->write(sample);
     last_.push_back(sample);
   }
 }
@@ -208,7 +221,7 @@ void FlowOutput::write_cells() {
   if (simulation_.steps() > 0) {
     simulation_.coupling()->tractions_for_output();
     const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
-    slip_ = larger(slip_, simulation_.immersed()->slip()[1] / speed);
+    totals_.slip = larger(totals_.slip, simulation_.immersed()->slip()[1] / speed);
   }
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;
@@ -223,9 +236,35 @@ void FlowOutput::write_cells() {
 void FlowOutput::write_checkpoint_now() {
 #ifdef CORPUSCLE_HDF5
   const std::string path = folder_ + "/checkpoint.h5";
-  write_checkpoint(path, simulation_, scene_.resolved);
+  std::string totals = to_text(totals_now());
+  simulation_.grid().comm().broadcast(totals);
+  write_checkpoint(path, simulation_, scene_.resolved, totals);
   last_checkpoint_ = path;
 #endif
+}
+
+void FlowOutput::stop() {
+  write_checkpoint_now();
+  if (history_) measure();
+}
+
+void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& totals) {
+  last_checkpoint_ = checkpoint;
+  totals_ = totals;
+  energy_.resume(totals.energy);
+  if (simulation_.immersed()) simulation_.immersed()->resume(totals.immersed);
+}
+
+/// All that has been counted, of this run and those before it.
+RunTotals FlowOutput::totals_now(bool together) {
+  const Comm& comm = simulation_.grid().comm();
+  const auto largest = [&](double seconds) { return together ? comm.max(seconds) : seconds; };
+  RunTotals now = totals_;
+  now.energy = energy_.state();
+  if (simulation_.immersed() && together) now.immersed = simulation_.immersed()->report();
+  now.wall_s += largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
+  for (const auto& [part, seconds] : timers_.seconds()) now.wall_s_by_part[part] += largest(seconds);
+  return now;
 }
 
 void FlowOutput::fill_energy(Report& report) const {
@@ -269,63 +308,72 @@ void FlowOutput::fill_quantities(Report& report) const {
   if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
 }
 
-/// Share of the surfaces' vertices whose last traction did not come from a full fit.
-double FlowOutput::traction_fallbacks() const {
-  const auto fits = simulation_.immersed()->boundary().traction_fallbacks();
-  const Comm& comm = simulation_.grid().comm();
-  double all = 0, poor = 0;
-  for (int how = traction_fitted; how <= traction_nothing; ++how) all += fits[how];
-  for (int how : {traction_gradient, traction_normal, traction_nothing, pressure_average, pressure_nothing}) poor += fits[how];
-  all = comm.sum(all), poor = comm.sum(poor);
-  return all > 0 ? poor / all : 0;
-}
-
-void FlowOutput::fill(Report& report) {
+void FlowOutput::fill_totals(Report& report, const RunTotals& now) const {
   auto& errors = report.errors;
-  errors["max_divergence"] = divergence_;
-  errors["flux_correction"] = flux_correction_;
-  errors["splitting"] = splitting_;
-  errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
+  errors["max_divergence"] = now.divergence;
+  errors["flux_correction"] = now.flux_correction;
+  errors["splitting"] = now.splitting;
   if (simulation_.surfaces()) {
-    errors["slip"] = slip_;
-    const auto& search = simulation_.immersed()->report();
+    errors["slip"] = now.slip;
+    const auto& search = now.immersed;
     report.extra["immersed"] = {{"classifications", search.classifications},
                                 {"immersed_nodes", search.immersed},
                                 {"inside_nodes", search.inside},
                                 {"isolated_nodes", search.isolated},
                                 {"uncovered_nodes", search.uncovered},
                                 {"velocity_fallbacks", search.velocity_fallbacks},
-                                {"least_wall_spacings", search.least_wall_spacings},
-                                {"traction_fits", simulation_.immersed()->boundary().traction_fallbacks()}};
-    errors["traction_fallbacks"] = traction_fallbacks();
+                                {"least_wall_spacings", search.least_wall_spacings}};
     if (search.least_wall_spacings < 1e30) errors["least_wall_spacings"] = search.least_wall_spacings;
     if (search.least_body_spacings < 1e30)
       errors["least_body_spacings"] = report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
   }
   if (simulation_.membranes()) {
-    errors["volume_drift"] = volume_drift_;
-    errors["area_drift"] = area_drift_;
-    errors["coupling_residual"] = residual_.samples ? residual_.sum / residual_.samples : 0.0;
-    errors["coupling_residual_max"] = residual_.largest;
+    errors["volume_drift"] = now.volume_drift;
+    errors["area_drift"] = now.area_drift;
+    errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
+    errors["coupling_residual_max"] = now.residual.largest;
     report.extra["stability"] = simulation_.coupling()->report(simulation_.last_step_us());
   }
   fill_energy(report);
-  report.warnings = judge(errors, {simulation_.fluid().statistics().reference_speed, energy_.largest_fJ(),
-                                   scene_.fluid->convection == FluidSettings::Convection::none});
+  report.momentum_iterations = now.momentum;
+  report.pressure_iterations = now.pressure;
+  report.projections = now.projections;
+  report.coupling_iterations = now.coupling;
+  report.membrane_substeps = now.substeps;
+  report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],
+                           simulation_.grid().index().global[2]};
+  report.wall_s = now.wall_s;
+  report.wall_s_this_run = now.wall_s - totals_.wall_s;
+  report.wall_s_by_part = now.wall_s_by_part;
+  report.steps = simulation_.steps();
+  report.simulated_us = simulation_.time();
+}
+
+void FlowOutput::judge_figures(Report& report) const {
+  report.warnings = judge(report.errors, {simulation_.fluid().statistics().reference_speed, energy_.largest_fJ(),
+                                          scene_.fluid->convection == FluidSettings::Convection::none});
+}
+
+void FlowOutput::fill_broken(Report& report, bool together) {
+  fill_totals(report, totals_now(together));
+  judge_figures(report);
+}
+
+void FlowOutput::fill(Report& report) {
+  fill_totals(report, totals_now());
+  auto& errors = report.errors;
+  errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
+  if (simulation_.surfaces()) {
+    const auto fits = simulation_.immersed()->traction_fits();
+    report.extra["immersed"]["traction_fits"] = fits;
+    errors["traction_fallbacks"] = poor_share(fits);
+  }
+  judge_figures(report);
   fill_quantities(report);
   for (const auto& [name, value] : reference_errors(scene_, simulation_)) errors[name] = value;
-  report.momentum_iterations = momentum_;
-  report.pressure_iterations = pressure_;
-  report.projections = projections_;
-  report.coupling_iterations = coupling_;
-  report.membrane_substeps = substeps_;
   Triple mean = mean_velocity(simulation_.fluid());
   for (double& component : mean) component /= units::mm_per_s;
   report.extra["superficial_velocity_mm_per_s"] = mean;
-  report.extra["cells"] = {simulation_.grid().index().global[0], simulation_.grid().index().global[1],
-                           simulation_.grid().index().global[2]};
-  report.steps = simulation_.steps();
-  report.simulated_us = simulation_.time();
 }
 
 }  // namespace corpuscle

@@ -1,12 +1,14 @@
 // What a flow run writes: history, fields, cells, checkpoints, and the error figures of the report.
 #pragma once
 
+#include "app/run_totals.hpp"
 #include "coupling/energy_balance.hpp"
 #include "output/cell_writer.hpp"
 #include "output/field_writer.hpp"
 #include "output/history.hpp"
 #include "output/report.hpp"
 
+#include <chrono>
 #include <memory>
 #include <optional>
 
@@ -15,8 +17,9 @@ namespace corpuscle {
 class FlowOutput {
  public:
   /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
+  /// @param start       when the program began this run
   FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
-             std::optional<double> restart_us);
+             std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
   /// a run warns at its end, beyond the second it is stopped.
@@ -25,23 +28,32 @@ class FlowOutput {
   /// After every step (and before the first, with `start`): whatever is due.
   /// @throws ComputationError  when a file cannot be written, or a membrane has stretched far beyond what one can
   void after_step(bool start = false);
-  /// The state as it is, at the end of a run that has finished or broken down.
-  void write_checkpoint_now();
+  /// The run ends here, before its time: a checkpoint, and what the report says of cells and bodies, but no sample that a
+  /// run without the stop would not have.
+  void stop();
   const std::string& last_checkpoint() const { return last_checkpoint_; }
-  /// The checkpoint that the run was started from is good until a newer one is written.
-  void started_from(const std::string& checkpoint) { last_checkpoint_ = checkpoint; }
-  /// Errors, iterations and counts gathered over the run.
+  /// The checkpoint that the run was started from is good until a newer one is written; the report goes on from its totals.
+  void started_from(const std::string& checkpoint, const RunTotals& totals);
+  /// Errors, iterations, counts and times gathered over the run, and over those that it goes on from.
   void fill(Report& report);
+  /// The same where the state is of no use.
+  /// @param together  all ranks call; otherwise what this one knows
+  void fill_broken(Report& report, bool together);
 
  private:
   bool due(double every_us) const;
   void gather();
   void write_history();
+  void measure();
+  void measure_bodies();
+  void write_checkpoint_now();
+  void fill_totals(Report& report, const RunTotals& now) const;
   void write_fields();
   void write_cells();
+  RunTotals totals_now(bool together = true);
   void fill_energy(Report& report) const;
   void fill_quantities(Report& report) const;
-  double traction_fallbacks() const;
+  void judge_figures(Report& report) const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
@@ -57,12 +69,11 @@ class FlowOutput {
 #endif
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
-  Tally momentum_, pressure_, projections_, coupling_, substeps_, residual_;
+  RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
+  std::chrono::steady_clock::time_point start_;
   EnergyBalance energy_;
   std::vector<HistorySample> last_;  // of every cell and body, at the last history sample
-  double elastic_energy_ = 0;  // of all cells at the last history sample, fJ
-  double divergence_ = 0, flux_correction_ = 0, volume_drift_ = 0, area_drift_ = 0, slip_ = 0;
-  double splitting_ = 0;  // largest at the times of fields and cells
+  double elastic_energy_ = 0;        // of all cells at the last history sample, fJ
 };
 
 }  // namespace corpuscle

@@ -10,6 +10,7 @@
 #include <Kokkos_Core.hpp>
 
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -23,7 +24,10 @@ namespace {
 
 using namespace corpuscle;
 
-constexpr int input_is_wrong = InputError::exit_code, broke_down = ComputationError::exit_code;
+constexpr const char* ends =
+    "Exit codes: 0 done; 2 the input is wrong; 3 the computation broke down; 4 stopped by a signal, with report and checkpoint\n"
+    "(SIGTERM, SIGINT, SIGHUP or SIGUSR1: the step is finished first; a second signal ends at once); 5 a cell reached the\n"
+    "outflow (time.stop_before_outflow_um), with all results.";
 
 /// End without unwinding libraries that may be in the middle of a failed operation; every rank goes.
 [[noreturn]] void leave(const Comm& comm, int code) {
@@ -43,19 +47,18 @@ void complain(const Comm& comm, const std::string& message) {
   log_error(message, true);
 }
 
-int run_command(const Comm& comm, const std::function<void()>& command) {
+int run_command(const Comm& comm, const std::function<int()>& command) {
   try {
-    command();
-    return 0;
+    return command();
   } catch (const InputError& error) {
     complain(comm, error.what());
-    leave(comm, input_is_wrong);
+    leave(comm, exit_input_wrong);
   } catch (const ComputationError& error) {
     complain(comm, fmt::format("the computation broke down {}", error.what()));
-    leave(comm, broke_down);
+    leave(comm, exit_broke_down);
   } catch (const std::exception& error) {
     complain(comm, fmt::format("the computation broke down: {} (out of memory, or a fault of the program)", error.what()));
-    leave(comm, broke_down);
+    leave(comm, exit_broke_down);
   }
 }
 
@@ -89,11 +92,14 @@ Command parse(CLI::App& app, int argc, char** argv) {
   app.set_version_flag("--version", "corpuscle " + git_hash());
   auto* run = app.add_subcommand("run", "run a case to its end");
   run->add_option("case", options.case_path, "case file (TOML)")->required();
-  run->add_option("--out", options.folder, "folder for the results (default: runs/<case>)");
+  run->add_option("--out", options.folder, "folder for the results (default: runs/<case>-001 or the first number that is free, with runs/latest leading to it)");
+  run->add_flag("--overwrite", options.overwrite, "write over the results that the folder of --out holds");
   run->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
   run->add_option("--restart", options.restart, "checkpoint.h5 to continue from");
   run->add_flag("--estimate-error{all}", options.estimate,
                 "error bars from further, coarser runs: spacing, step, vertices (comma-separated), or all");
+  run->footer(ends);
+  app.footer(ends);
   auto* check = app.add_subcommand("check", "validate a case; list modules, unknowns, memory and time; run nothing");
   check->add_option("case", options.case_path, "case file (TOML)")->required();
   check->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
@@ -126,18 +132,20 @@ bool can_stay_alone(const Command& command) {
 #endif
 
 int execute(const Comm& comm, const Command& command) {
-  return run_command(comm, [&] {
+  return run_command(comm, [&]() -> int {
     switch (command.kind) {
-      case Command::Kind::run: return run_case(comm, command.options);
-      case Command::Kind::check: return check_case(comm, command.options);
-      case Command::Kind::mesh: return write_mesh(command.vertices, command.mesh_path);
+      case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
+      case Command::Kind::check: check_case(comm, command.options); break;
+      case Command::Kind::mesh: write_mesh(command.vertices, command.mesh_path); break;
     }
+    return static_cast<int>(exit_done);
   });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a failed write, with a message
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
   wait_briefly(argv);
   CLI::App app{"Red blood cells in flowing plasma", "corpuscle"};
@@ -158,7 +166,7 @@ int main(int argc, char** argv) {
     open_log(comm.root());
     if (refused) {
       if (comm.root()) app.exit(*refused);
-      code = refused->get_exit_code() == 0 ? 0 : input_is_wrong;
+      code = refused->get_exit_code() == 0 ? 0 : exit_input_wrong;
     } else {
       share_cores(comm);
       Kokkos::initialize(argc, argv);

@@ -1,6 +1,7 @@
 // The commands of the program.
 #pragma once
 
+#include "core/exit_code.hpp"
 #include "parallel/comm.hpp"
 
 #include <string>
@@ -10,14 +11,17 @@ namespace corpuscle {
 
 struct RunOptions {
   std::string case_path;
-  std::string folder;                  // empty: runs/<name of the case file>
+  std::string folder;                  // empty: runs/<name of the case file>-001, or the first number that is free
+  bool overwrite = false;              // results that the folder holds
   std::vector<std::string> overrides;  // section.key=value
   std::string restart;                 // checkpoint to continue from; empty: from the start
   std::string estimate;                // coarser runs for error bars (error_estimate.hpp); empty: none
 };
 
-/// Run a case to its end, and then the coarser runs for its error bars. @throws InputError, ComputationError
-void run_case(const Comm& comm, const RunOptions& options);
+/// Run a case to its end, and then the coarser runs for its error bars.
+/// @return how it ended, other than by an error
+/// @throws InputError, ComputationError
+ExitCode run_case(const Comm& comm, const RunOptions& options);
 
 /// Validate a case and print modules, unknowns and estimates of memory and time; run nothing. @throws InputError
 void check_case(const Comm& comm, const RunOptions& options);

@@ -46,6 +46,11 @@ class Coupling {
   /// For a step of that length; nothing where no membrane is coupled.
   virtual std::optional<StabilityEstimate> stability(double) const { return std::nullopt; }
 
+  /// Whether a cell is so near to an outflow that the run should end before another step of that length, and which cell
+  /// and where, for messages (all ranks call). Nearer, the end of the grid disturbs the flow; beyond it there is none.
+  virtual bool at_outflow(double) const { return false; }
+  virtual std::string nearest_outflow() const { return ""; }
+
   /// What the next step depends on beyond the flow and the bodies' positions and velocities, for restarts.
   virtual std::vector<double> state() const { return {}; }
   virtual void set_state(const std::vector<double>&) {}

@@ -38,7 +38,7 @@ void EnergyBalance::sample(double elastic_fJ) {
   now.gradient = flow.gradient_nW;
   now.dissipation = flow.dissipation_nW;
   now.kinetic = flow.kinetic_fJ;
-  driving_pressure_ = flow.inflow_um3_per_us > 0 ? flow.boundaries_nW / flow.inflow_um3_per_us : 0;
+  state_.driving_pressure = flow.inflow_um3_per_us > 0 ? flow.boundaries_nW / flow.inflow_um3_per_us : 0;
   if (surfaces) {
     const auto& stress = simulation_.immersed()->last_stress();
     const int of_cells = simulation_.membranes() ? simulation_.membranes()->vertices() : 0;
@@ -51,31 +51,31 @@ void EnergyBalance::sample(double elastic_fJ) {
     now.membrane_dissipation = membranes->dissipation_nW();
     now.membrane_kinetic = membranes->kinetic_energy_fJ();
   }
-  if (samples_ == 0) {
-    first_ = now;
+  if (state_.samples == 0) {
+    state_.first = now;
   } else {
-    const double half = 0.5 * (simulation_.time() - time_);
+    const double half = 0.5 * (simulation_.time() - state_.time);
     for (auto rate : {&EnergyTotals::boundaries, &EnergyTotals::gradient, &EnergyTotals::dissipation,
                       &EnergyTotals::on_cells, &EnergyTotals::on_bodies, &EnergyTotals::membrane_dissipation})
-      totals_.*rate += half * (rates_.*rate + now.*rate);
+      state_.totals.*rate += half * (state_.rates.*rate + now.*rate);
     for (auto content : {&EnergyTotals::kinetic, &EnergyTotals::elastic, &EnergyTotals::membrane_kinetic})
-      totals_.*content = now.*content - first_.*content;
+      state_.totals.*content = now.*content - state_.first.*content;
   }
-  rates_ = now;
-  time_ = simulation_.time();
-  ++samples_;
+  state_.rates = now;
+  state_.time = simulation_.time();
+  ++state_.samples;
 }
 
-double EnergyBalance::largest_fJ() const { return largest_term(totals_); }
+double EnergyBalance::largest_fJ() const { return largest_term(state_.totals); }
 
 std::optional<double> EnergyBalance::imbalance() const {
-  const EnergyTotals& t = totals_;
+  const EnergyTotals& t = state_.totals;
   const double in = t.boundaries + t.gradient;
   return share(in - t.dissipation - t.kinetic - t.on_bodies - kept_by_membranes(t), largest_term(t));
 }
 
 std::optional<double> EnergyBalance::coupling_imbalance() const {
-  return share(totals_.on_cells - kept_by_membranes(totals_), largest_term(totals_));
+  return share(state_.totals.on_cells - kept_by_membranes(state_.totals), largest_term(state_.totals));
 }
 
 }  // namespace corpuscle

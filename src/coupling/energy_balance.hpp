@@ -23,14 +23,24 @@ struct EnergyTotals {
 
 class EnergyBalance {
  public:
+  /// What the balance knows at its last sample, for checkpoints.
+  struct State {
+    EnergyTotals totals, rates, first;  // rates in nW; contents of the first sample, in fJ
+    double driving_pressure = 0, time = 0;
+    long samples = 0;
+  };
+
   explicit EnergyBalance(FlowSimulation& simulation) : simulation_(simulation) {}
+
+  const State& state() const { return state_; }
+  void resume(const State& state) { state_ = state; }
 
   /// Add what happened since the last sample, by the trapezoidal rule in time: as exact as the samples are close. The
   /// last tractions must belong to the present state.
   /// @param elastic_fJ  of all membranes at present
   void sample(double elastic_fJ);
 
-  const EnergyTotals& totals() const { return totals_; }
+  const EnergyTotals& totals() const { return state_.totals; }
   /// The largest term of the whole balance, fJ.
   double largest_fJ() const;
   /// What is not accounted for, over the largest term. None before there are two samples, or where nothing moves.
@@ -39,14 +49,11 @@ class EnergyBalance {
   std::optional<double> coupling_imbalance() const;
   /// Mean pressure that drives the flow through the sides at the last sample: power over volume flow, kPa. Zero where
   /// nothing flows in.
-  double driving_pressure_kPa() const { return driving_pressure_; }
+  double driving_pressure_kPa() const { return state_.driving_pressure; }
 
  private:
   FlowSimulation& simulation_;
-  EnergyTotals totals_, rates_, first_;  // rates in nW; contents of the first sample, in fJ
-  double driving_pressure_ = 0;
-  double time_ = 0;
-  long samples_ = 0;
+  State state_;
 };
 
 }  // namespace corpuscle

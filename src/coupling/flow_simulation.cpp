@@ -56,6 +56,10 @@ void FlowSimulation::step() {
   last_step_ = dt;
 }
 
+std::string FlowSimulation::outflow_message() const {
+  return fmt::format("a cell reached the outflow: {} at {:.6g} us (time.stop_before_outflow_um)", coupling_->nearest_outflow(), time_);
+}
+
 void FlowSimulation::resume(const Progress& progress) {
   tick_ = schedule_.tick_at(progress.time);
   if (tick_ < 0)

@@ -35,6 +35,9 @@ class FlowSimulation {
   ImmersedFlow* immersed() { return coupling_ ? coupling_->immersed() : nullptr; }
   const SurfaceSet* surfaces() const { return coupling_ ? &coupling_->surfaces() : nullptr; }
   const StepStatistics& statistics() const { return statistics_; }
+  /// Whether a cell has come so near to an outflow that the run should end, and a text that says which, where and when.
+  bool at_outflow() const { return coupling_ && coupling_->at_outflow(next_step_us()); }
+  std::string outflow_message() const;
   int cells() { return membranes() ? membranes()->cells() : 0; }
 
   /// State beyond that of fluid, bodies and coupling, for checkpoints.

@@ -41,7 +41,7 @@ PeriodicFrame periodic_frame(const Grid& grid) {
 
 }  // namespace
 
-ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers)
+ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const Leaving& leaving, Timers& timers)
     : fluid_(fluid), surfaces_(surfaces), timers_(timers) {
   ImmersedOptions options;
   for (int side = 0; side < 6; ++side) options.wall[side] = fluid.boundaries().is_wall(side);
@@ -51,6 +51,8 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
     options.sum = [grid](long value) { return grid->comm().sum(value); };
     options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
   }
+  options.outflow = leaving.sides;
+  options.travellers = leaving.vertices;
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;
   bodies_.images = boundary_->images();
@@ -59,6 +61,7 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timer
   traction_ = Components<double>("corpuscle::coupling::traction", surfaces.vertices, 3);
   stress_ = make_surface_stress("corpuscle::coupling::stress", surfaces.vertices);
   if (fluid.grid().comm().size() > 1) found_host_ = HostCopy(boundary_->found_stress().values);
+  x_classified_ = Components<double>("corpuscle::immersed::x_classified", surfaces.vertices, 3);
 }
 
 /// The lowest vertex that no rank finds in its block. For error messages: copies to the host.
@@ -72,15 +75,26 @@ int ImmersedFlow::first_unowned_vertex() {
 void ImmersedFlow::check_positions(double smallest_gap) {
   const auto& counts = boundary_->counts();
   const Comm& comm = fluid_.grid().comm();
-  double worst[5] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
+  double worst[6] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
                      static_cast<double>(counts.crossed_links), -counts.body_spacings,
-                     static_cast<double>(counts.uncovered)};
-  comm.max(worst, 5);
+                     static_cast<double>(counts.uncovered), -counts.outflow_um};
+  comm.max(worst, 6);
   any_uncovered_ = worst[4] > 0;
   const double to_wall = -worst[1], between = -worst[3];
+  outflow_um_ = -worst[5];
+  outflow_vertex_ = counts.outflow_um == outflow_um_ ? counts.outflow_vertex : -1;
   report_.least_wall_spacings = smaller(report_.least_wall_spacings, to_wall);
   report_.least_body_spacings = smaller(report_.least_body_spacings, between);
-  const long found = comm.sum(static_cast<long>(counts.owned_vertices));
+  double sums[5] = {static_cast<double>(counts.owned_vertices), static_cast<double>(counts.immersed),
+                    static_cast<double>(counts.inside), static_cast<double>(counts.isolated),
+                    static_cast<double>(counts.uncovered)};
+  comm.sum(sums, 5);
+  const long found = std::lround(sums[0]);
+  report_.classifications += 1;
+  report_.immersed = std::max(report_.immersed, std::lround(sums[1]));
+  report_.inside = std::max(report_.inside, std::lround(sums[2]));
+  report_.isolated = std::max(report_.isolated, std::lround(sums[3]));
+  report_.uncovered += std::lround(sums[4]);
   int vertex = static_cast<int>(worst[0]);
   if (vertex >= 0 || found < surfaces_.vertices) {
     if (vertex < 0) vertex = first_unowned_vertex();
@@ -162,8 +176,9 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   const auto scope = timers_.scope("search");
   update_surface_geometry(surfaces_);
   boundary_->classify();
-  check_positions(smallest_gap);
+  Kokkos::deep_copy(Exec(), x_classified_, surfaces_.x);
   const bool first = report_.classifications == 0;
+  check_positions(smallest_gap);
   if (first) check_resolution();
   fluid_.grid().halo().exchange(boundary_->nodes().kind);
   fluid_.grid().halo().exchange(boundary_->nodes().body);
@@ -171,13 +186,8 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   boundary_->find_faces();
   boundary_->build_stencils();
   const auto& counts = boundary_->counts();
-  report_.classifications += 1;
-  report_.immersed = std::max(report_.immersed, counts.immersed);
-  report_.inside = std::max(report_.inside, counts.inside);
-  report_.isolated = std::max(report_.isolated, counts.isolated);
-  report_.uncovered += counts.uncovered;
   for (int kind = static_cast<int>(RowKind::least_squares); kind < row_kinds; ++kind)
-    report_.velocity_fallbacks += counts.velocity_rows[kind];
+    own_velocity_fallbacks_ += counts.velocity_rows[kind];
   bodies_.rows = counts.immersed;
   bodies_.velocity = boundary_->velocity_stencils();
   bodies_.pressure = boundary_->pressure_stencils();
@@ -186,6 +196,43 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   const auto matrix = timers_.scope("pressure matrix");
   fluid_.set_kinds(boundary_->nodes().kind);
   if (first) fluid_.check_connected();
+}
+
+std::optional<NearOutflow> ImmersedFlow::nearest_outflow() const {
+  if (!(outflow_um_ < 1e30)) return std::nullopt;
+  const int vertex = static_cast<int>(fluid_.grid().comm().max(static_cast<double>(outflow_vertex_)));
+  return NearOutflow{outflow_um_, boundary_->describe_vertex(vertex)};
+}
+
+const ImmersedReport& ImmersedFlow::report() {
+  report_.velocity_fallbacks += fluid_.grid().comm().sum(own_velocity_fallbacks_);
+  own_velocity_fallbacks_ = 0;
+  return report_;
+}
+
+std::vector<long> ImmersedFlow::traction_fits() const {
+  const auto own = boundary_->traction_fallbacks();
+  std::vector<long> all;
+  for (const int count : own) all.push_back(fluid_.grid().comm().sum(static_cast<long>(count)));
+  return all;
+}
+
+std::vector<double> ImmersedFlow::classified_positions() const {
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x_classified_);
+  std::vector<double> positions;
+  for (int v = 0; v < surfaces_.vertices; ++v)
+    for (int m = 0; m < 3; ++m) positions.push_back(host(v, m));
+  return positions;
+}
+
+void ImmersedFlow::resume(const std::vector<double>& positions) {
+  const auto host = Kokkos::create_mirror_view(surfaces_.x);
+  for (int v = 0; v < surfaces_.vertices; ++v)
+    for (int m = 0; m < 3; ++m) host(v, m) = positions[3 * v + m];
+  Kokkos::deep_copy(surfaces_.x, host);
+  boundary_->forget_places();
+  update_geometry(0.0);
+  own_velocity_fallbacks_ = 0;
 }
 
 void ImmersedFlow::solve(double time) {

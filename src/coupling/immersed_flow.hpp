@@ -7,24 +7,35 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace corpuscle {
 
-/// Worst counts over a run, for the report.
+/// Worst counts over a run, for the report; of all ranks together.
 struct ImmersedReport {
   long classifications = 0;
-  int immersed = 0, inside = 0, isolated = 0;
+  long immersed = 0, inside = 0, isolated = 0;
   long uncovered = 0;               // nodes that came out of a body, over the run
   long velocity_fallbacks = 0;      // rows worse than one probe, over the run
-  long traction_fallbacks = 0;      // fits worse than the first choice, at the last output
   double least_wall_spacings = 1e30;
   double least_body_spacings = 1e30;  // between two bodies
 };
 
+/// Who may leave the grid where: the first vertices, those of cells, through sides that flow leaves by.
+struct Leaving {
+  std::array<bool, 6> sides{};
+  int vertices = 0;
+};
+
+struct NearOutflow {
+  double distance_um;
+  std::string vertex;  // "cells.0, vertex 17 at (x, y, z) um"
+};
+
 class ImmersedFlow {
  public:
-  ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, Timers& timers);
+  ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const Leaving& leaving, Timers& timers);
 
   /// Classify nodes and build all stencils at the surfaces' present positions.
   /// @param smallest_gap  refuse surfaces nearer to a wall or to each other than this many local spacings
@@ -53,7 +64,22 @@ class ImmersedFlow {
   /// How far each body has been moved back by whole periods since the start, um; copies to the host.
   std::vector<Triple> wrapped_by() const;
 
-  const ImmersedReport& report() const { return report_; }
+  /// Counts so far. All ranks call.
+  const ImmersedReport& report();
+  /// How near to an outflow a cell was at the last classification, um along the grid line.
+  double outflow_um() const { return outflow_um_; }
+  /// The same with the vertex's name and place, for messages; none without cells or outflow. All ranks call.
+  std::optional<NearOutflow> nearest_outflow() const;
+  /// How the last tractions came about, by TractionFallback, over all ranks. All ranks call.
+  std::vector<long> traction_fits() const;
+
+  /// Where the vertices were when nodes were classified last, three numbers each: with it, a restarted run classifies as
+  /// the stopped one had.
+  std::vector<double> classified_positions() const;
+  /// Classify as a stopped run had. Leaves the surfaces there: their state comes after.
+  void resume(const std::vector<double>& positions);
+  /// Go on counting from those of a stopped run.
+  void resume(const ImmersedReport& counts) { report_ = counts; }
   FluidSolver& fluid() { return fluid_; }
   ImmersedBoundary& boundary() { return *boundary_; }
   const EmbeddedBodies& bodies() const { return bodies_; }
@@ -74,8 +100,12 @@ class ImmersedFlow {
   SurfaceStress stress_;
   Components<double> traction_;
   HostCopy<Components<double>> found_host_;
+  Components<double> x_classified_;  // [vertex, 3] um, at the last classification
+  double outflow_um_ = 1e30;  // of all ranks
+  int outflow_vertex_ = -1;   // if it is this rank that sees it
   ImmersedReport report_;
   bool any_uncovered_ = false;  // on any rank, at the last classification
+  long own_velocity_fallbacks_ = 0;  // of this rank, not yet in report_
 };
 
 }  // namespace corpuscle

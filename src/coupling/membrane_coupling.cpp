@@ -1,6 +1,7 @@
 #include "coupling/membrane_coupling.hpp"
 
 #include "core/error.hpp"
+#include "core/log.hpp"
 #include "core/units.hpp"
 #include "immersed/surface_motion.hpp"
 #include "membrane/interface.hpp"
@@ -48,6 +49,7 @@ MembraneCoupling::MembraneCoupling(const Case& scene, FluidSolver& fluid, Timers
 
 void MembraneCoupling::check_start() {
   SharpCoupling::check_start();
+  watch_outflow();
   constexpr double confined = 2.0;
   smallest_spacing_ = immersed_->smallest_spacing_at_surfaces();
   const auto cells = membranes_->diagnostics();
@@ -58,6 +60,25 @@ void MembraneCoupling::check_start() {
     added_mass_per_area_ = std::max(added_mass_per_area_, scene_.fluid->density_pg_per_um3 * confined * 8.0 / 3 *
                                                               std::pow(radius, 3) / area);
   }
+}
+
+/// A cell may start nearer to an outflow than it may come to it later: it then stops half way.
+void MembraneCoupling::watch_outflow() {
+  outflow_limit_ = scene_.time.stop_before_outflow_um;
+  if (!(immersed_->outflow_um() < outflow_limit_)) return;
+  outflow_limit_ = 0.5 * immersed_->outflow_um();
+  warn("{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left; move the cell (center_um) or "
+       "lengthen the grid", nearest_outflow(), outflow_limit_);
+}
+
+bool MembraneCoupling::at_outflow(double dt) const {
+  const double two_steps = 2 * fluid_.statistics().reference_speed * dt;
+  return immersed_->outflow_um() < std::max(outflow_limit_, two_steps);
+}
+
+std::string MembraneCoupling::nearest_outflow() const {
+  const auto near = immersed_->nearest_outflow();
+  return near ? fmt::format("{} is {:.3g} um from an outflow", near->vertex, near->distance_um) : "";
 }
 
 /// A loosely coupled membrane is unstable where the fluid's reaction to its velocity, over one step, exceeds its inertia

@@ -14,6 +14,8 @@ class MembraneCoupling : public SharpCoupling {
   void check_start() override;
   std::optional<StabilityEstimate> stability(double dt_us) const override;
   std::map<std::string, double> report(double dt_us) const override;
+  bool at_outflow(double dt_us) const override;
+  std::string nearest_outflow() const override;
 
  protected:
   void place_bodies(double time, double dt);
@@ -23,6 +25,9 @@ class MembraneCoupling : public SharpCoupling {
   double quiet_speed_ = 0;  // um/us, below which cells count as at rest
 
  private:
+  void watch_outflow();
+
+  double outflow_limit_ = 0;  // um
   double least_mass_per_area_ = 1e300, added_mass_per_area_ = 0, smallest_spacing_ = 0;  // pg/um2, pg/um2, um
 };
 

@@ -46,16 +46,22 @@ CellBox face_range(const IndexSpace& index, int d) {
 
 CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}; }
 
-/// A checkpoint with cells does not fit a case without, nor one with other bodies.
-void require_same_parts(const std::string& path, const CheckpointReader& file, FlowSimulation& simulation) {
-  const auto compare = [&](const char* name, bool here, const char* what) {
-    if (file.has(name) && !here)
-      throw InputError(fmt::format("{}: is of another scene: it holds {} ({}), and this case has none", path, what, name));
-    if (!file.has(name) && here)
-      throw InputError(fmt::format("{}: is of another scene: it holds no {} ({}), and this case has some", path, what, name));
-  };
-  compare("membranes", simulation.membranes() != nullptr, "cells");
-  compare("locations", simulation.immersed() != nullptr, "cells or bodies");
+/// The stored state fits no other geometry.
+std::vector<CaseChange> allowed_changes(const std::string& path, const std::string& before, const std::string& now) {
+  std::vector<CaseChange> allowed;
+  std::string refused;
+  for (const auto& change : case_changes(before, now)) {
+    if (!change.geometry)
+      allowed.push_back(change);
+    else
+      refused += fmt::format("{}{} = {} (in the checkpoint: {})", refused.empty() ? "" : "; ", change.key, change.now,
+                             change.before);
+  }
+  if (!refused.empty())
+    throw InputError(fmt::format("{}: this checkpoint is of another scene: {}. A restart may change properties and speeds, not "
+                                 "the geometry: restore these keys, or run the case from its start",
+                                 path, refused));
+  return allowed;
 }
 
 const char* flux_name(int d) { return std::array<const char*, 3>{"flux_i", "flux_j", "flux_k"}[d]; }
@@ -63,7 +69,8 @@ const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i
 
 }  // namespace
 
-void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved) {
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
+                      const std::string& totals) {
   const IndexSpace& index = simulation.grid().index();
   const auto progress = simulation.progress();
   CheckpointHeader header;
@@ -100,23 +107,22 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     file.add("membranes", {membranes.size()}, membranes.data());
   }
   if (simulation.immersed()) {
-    const auto places = simulation.immersed()->boundary().location_state();
-    file.add("locations", {places.size()}, places.data());
+    const auto positions = simulation.immersed()->classified_positions();
+    file.add("classified_positions", {positions.size() / 3, 3}, positions.data());
   }
   if (simulation.immersed() && simulation.immersed()->boundary().periodic()) {
     const auto laps = simulation.immersed()->boundary().laps_state();
     file.add("laps", {laps.size()}, laps.data());
   }
+  file.add_text("totals", totals);
   file.commit();
 }
 
-void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
+namespace {
+
+FluidState read_fluid(const CheckpointReader& file, FlowSimulation& simulation) {
   const IndexSpace& index = simulation.grid().index();
-  const CheckpointReader file(path, simulation.grid().comm());
-  file.require_grid({index.global[0], index.global[1], index.global[2]});
-  require_same_parts(path, file, simulation);
-  FluidSolver& fluid = simulation.fluid();
-  auto state = fluid.state().copy();
+  auto state = simulation.fluid().state().copy();
   const CellBox owned = owned_box(index);
   const auto vector = [&](const char* name, const Components<double>& field) {
     std::vector<double> values(3 * owned.size());
@@ -142,43 +148,59 @@ void read_checkpoint(const std::string& path, FlowSimulation& simulation) {
       set_box_values(index, faces, flux, state.flux_old[d]);
     }
   }
-  double numbers[2];
-  file.read("numbers", {2}, numbers);
-  try {
-    simulation.resume({file.header().time_us, numbers[1], file.header().step});
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", path, error.what()));
+  return state;
+}
+
+/// Nodes are classified as they were in the last step, and then the surfaces put where that step left them.
+void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
+  const SurfaceSet& surfaces = *simulation.surfaces();
+  std::vector<double> positions(3 * static_cast<std::size_t>(surfaces.vertices));
+  file.read("classified_positions", {positions.size() / 3, 3}, positions.data());
+  simulation.immersed()->resume(positions);
+  if (simulation.immersed()->boundary().periodic()) {
+    auto laps = simulation.immersed()->boundary().laps_state();
+    file.read("laps", {laps.size()}, laps.data());
+    simulation.immersed()->boundary().set_laps_state(laps);
   }
-  std::int64_t levels = 0;
-  file.read("history_levels", {1}, &levels);
-  state.reference_speed = numbers[0];
-  state.time_us = file.header().time_us;
-  state.step_us = numbers[1];
-  state.history_levels = static_cast<int>(levels);
   // Another scheme than that of the checkpoint starts without a history of its own.
-  if (simulation.coupling() && file.has("coupling")) {
-    auto coupling = simulation.coupling()->state();
-    if (!coupling.empty() && file.shape("coupling") == Shape{coupling.size()}) {
-      file.read("coupling", {coupling.size()}, coupling.data());
-      simulation.coupling()->set_state(coupling);
-    }
+  auto coupling = simulation.coupling()->state();
+  if (!coupling.empty() && file.has("coupling") && file.shape("coupling") == Shape{coupling.size()}) {
+    file.read("coupling", {coupling.size()}, coupling.data());
+    simulation.coupling()->set_state(coupling);
   }
   if (simulation.membranes()) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());
     simulation.membranes()->set_state(membranes);
   }
-  if (simulation.immersed()) {
-    std::vector<double> places(simulation.immersed()->boundary().location_state().size());
-    file.read("locations", {places.size()}, places.data());
-    simulation.immersed()->boundary().set_location_state(places);
+}
+
+}  // namespace
+
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved) {
+  const IndexSpace& index = simulation.grid().index();
+  const CheckpointReader file(path, simulation.grid().comm());
+  Restored restored;
+  restored.changes = allowed_changes(path, file.header().resolved, resolved);
+  file.require_grid({index.global[0], index.global[1], index.global[2]});
+  double numbers[2];
+  std::int64_t levels = 0;
+  file.read("numbers", {2}, numbers);
+  file.read("history_levels", {1}, &levels);
+  if (simulation.immersed()) read_surfaces(file, simulation);
+  try {
+    simulation.resume({file.header().time_us, numbers[1], file.header().step});
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path, error.what()));
   }
-  if (simulation.immersed() && simulation.immersed()->boundary().periodic()) {
-    auto laps = simulation.immersed()->boundary().laps_state();
-    file.read("laps", {laps.size()}, laps.data());
-    simulation.immersed()->boundary().set_laps_state(laps);
-  }
-  fluid.restore(state);
+  auto state = read_fluid(file, simulation);
+  state.reference_speed = numbers[0];
+  state.time_us = file.header().time_us;
+  state.step_us = numbers[1];
+  state.history_levels = static_cast<int>(levels);
+  simulation.fluid().restore(state);
+  restored.totals = file.text("totals");
+  return restored;
 }
 
 }  // namespace corpuscle

@@ -4,17 +4,29 @@
 #ifdef CORPUSCLE_HDF5
 
 #include "coupling/flow_simulation.hpp"
+#include "input/case_changes.hpp"
 
 #include <string>
+#include <vector>
 
 namespace corpuscle {
 
 /// Write everything that continuing with the same bits needs; the previous checkpoint stays until this one is complete.
+/// @param totals  what the report has gathered so far, the same on all ranks
 /// @throws ComputationError  when the disk is full
-void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved);
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
+                      const std::string& totals);
 
-/// @throws InputError  for a file that is damaged, foreign, or of another grid or other cells
-void read_checkpoint(const std::string& path, FlowSimulation& simulation);
+/// What a checkpoint says beyond the state of the simulation.
+struct Restored {
+  std::string totals;
+  std::vector<CaseChange> changes;  // of keys that a restart may change
+};
+
+/// Go on from a checkpoint, on any number of ranks.
+/// @param resolved  the present case
+/// @throws InputError  for a file that is damaged, foreign, or of another grid, other sides, or other cells or bodies
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved);
 
 }  // namespace corpuscle
 

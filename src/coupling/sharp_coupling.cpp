@@ -20,7 +20,11 @@ SharpCoupling::SharpCoupling(const Case& scene, FluidSolver& fluid, Timers& time
     rigid_bodies_->move_to(0);
     fluid_.raise_reference_speed(rigid_bodies_->largest_speed());
   }
-  immersed_ = std::make_unique<ImmersedFlow>(fluid_, *surfaces_, timers_);
+  Leaving leaving;
+  leaving.vertices = membranes_ ? membranes_->vertices() : 0;
+  for (const auto& boundary : scene.boundaries)
+    leaving.sides[static_cast<int>(boundary.side)] = boundary.type == BoundarySettings::Type::outflow;
+  immersed_ = std::make_unique<ImmersedFlow>(fluid_, *surfaces_, leaving, timers_);
 }
 
 void SharpCoupling::check_start() {

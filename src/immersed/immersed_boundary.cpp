@@ -77,6 +77,8 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   images_ = make_images(grid.index, options.frame.period);
   find_bounds(lattice_, locate_);
   std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
+  std::copy(options.outflow.begin(), options.outflow.end(), locate_.outflow);
+  locate_.travellers = options.travellers;
 
   first_node_ = load(to_host(grid.x), grid.index.cell(0, 0, 0));
 
@@ -87,7 +89,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
              make<Array<double>>("vertex_band_width", items),
              make<Array<int>>("vertex_image", surface.vertices),
              make<Array<int>>("node_boxes", 6 * (surface.bodies + 1)),
-             make<Array<Key>>("vertex_findings", 3)};
+             make<Array<Key>>("vertex_findings", 4)};
   normals_ = {make<Components<double>>("face_normal", surface.triangles, 3),
               make<Components<double>>("angle_normal", surface.vertices, 3)};
   band_ = {make<Array<Key>>("closest", cells), make<Array<int>>("cut_links", cells),
@@ -154,6 +156,8 @@ NodeBox ImmersedBoundary::read_places() {
     counts_.wall_spacings = key_value(found(1));
     counts_.wall_vertex = static_cast<int>(key_item(found(1)));
   }
+  counts_.outflow_um = found(3) == no_key ? 1e30 : key_value(found(3));
+  counts_.outflow_vertex = found(3) == no_key ? -1 : static_cast<int>(key_item(found(3)));
   NodeBox all;
   for (int d = 0; d < 3; ++d) {
     all.lower[d] = box(d);
@@ -339,29 +343,6 @@ std::vector<char> ImmersedBoundary::owned_vertices() const {
   std::vector<char> owned(image.extent(0));
   for (std::size_t v = 0; v < owned.size(); ++v) owned[v] = image(v) >= 0;
   return owned;
-}
-
-std::vector<double> ImmersedBoundary::location_state() const {
-  const auto xi = to_host(places_.xi);
-  const auto status = to_host(places_.status);
-  std::vector<double> state;
-  for (std::size_t item = 0; item < status.extent(0); ++item) {
-    for (int d = 0; d < 3; ++d) state.push_back(xi(item, d));
-    state.push_back(static_cast<double>(status(item)));
-  }
-  return state;
-}
-
-void ImmersedBoundary::set_location_state(const std::vector<double>& state) {
-  auto xi = to_host(places_.xi);
-  auto status = to_host(places_.status);
-  for (std::size_t item = 0; item < status.extent(0); ++item) {
-    for (int d = 0; d < 3; ++d) xi(item, d) = state[4 * item + d];
-    status(item) = static_cast<Located>(static_cast<int>(state[4 * item + 3]));
-  }
-  Kokkos::deep_copy(places_.xi, xi);
-  Kokkos::deep_copy(places_.status, status);
-  locate_.warm = true;
 }
 
 std::string ImmersedBoundary::describe_vertex(int vertex) const {

@@ -22,6 +22,8 @@ struct ImmersedOptions {
   /// sum over all ranks, and the exchange of halos.
   std::function<long(long)> sum;
   std::function<void(const Array<std::int8_t>&)> exchange;
+  std::array<bool, 6> outflow{}; // sides through which the first `travellers` vertices, those of cells, may leave
+  int travellers = 0;
 };
 
 /// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
@@ -37,6 +39,8 @@ struct ImmersedCounts {
   int lost_vertex = -1;         // lowest vertex beyond a physical boundary seen here; -1: none
   double wall_spacings = 1e30;  // least distance to a wall, in local spacings
   int wall_vertex = -1;         // the vertex that has it
+  double outflow_um = 1e30;     // least distance of a cell to an outflow, along the grid line
+  int outflow_vertex = -1;      // the vertex that has it
   int crossed_links = 0;        // where surfaces cross, each other or themselves
   int crossed_node = -1;        // a node there
   double body_spacings = 1e30;  // least gap between two bodies, in spacings; what exceeds one may have escaped
@@ -106,10 +110,8 @@ class ImmersedBoundary {
   /// True where this rank owns the vertex; copies to the host. Over all ranks each vertex is owned exactly once, unless
   /// it left the grid.
   std::vector<char> owned_vertices() const;
-  /// Where the vertices were found last, from which the next search starts; restoring it makes a restarted run
-  /// repeat the same bits.
-  std::vector<double> location_state() const;
-  void set_location_state(const std::vector<double>& state);
+  /// Let the next search start from nothing: vertices have been put elsewhere.
+  void forget_places() { locate_.warm = false; }
   /// "bodies.2, vertex 17 at (x, y, z) um"; copies from the device.
   std::string describe_vertex(int vertex) const;
   /// The bodies beside a node of the band; copies from the device.

@@ -16,6 +16,7 @@ struct TimeSettings {
   double step_us = 1;
   double end_us = 0;
   double first_step_us = 0;  // the first steps are this long at most; 0: step_us
+  double stop_before_outflow_um = 3;  // the run ends when a cell is this near to an outflow, along the grid line
 
   bool operator==(const TimeSettings&) const = default;
 };

@@ -56,6 +56,7 @@ TimeSettings read_time(Section& s) {
   time.step_us = s.number("step_us", positive());
   time.end_us = s.number("end_us", positive());
   time.first_step_us = s.number("first_step_us", not_negative(), 0.0);
+  time.stop_before_outflow_um = s.number("stop_before_outflow_um", not_negative(), time.stop_before_outflow_um);
   s.finish();
   if (time.step_us > time.end_us) s.fail("step_us", fmt::format("must not exceed end_us = {}", time.end_us));
   return time;

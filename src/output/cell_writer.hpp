@@ -14,7 +14,7 @@ struct VertexField {
   const double* values;
 };
 
-/// Rank 0 writes: every rank holds all surfaces. The file is closed and complete between stored times.
+/// Rank 0 writes: every rank holds all surfaces.
 class CellWriter {
  public:
   /// @param triangles   three vertex numbers each, over all bodies
@@ -32,15 +32,13 @@ class CellWriter {
   void write(double time_us, long step, const double* x, const std::vector<VertexField>& fields = {});
 
  private:
-  void create(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies) const;
-  void resume(double restart_us);
-  void store(double time_us, long step, const double* x, const std::vector<VertexField>& fields);
-  void rewrite_xdmf() const;
+  void create(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies);
+  void require_same_surfaces(const std::string& path) const;
+  std::string describe(const StoredTime& time, const Hdf5File& file) const;
 
-  std::string path_, xdmf_path_;
   Comm comm_;
   hsize_t vertices_, triangles_;
-  std::vector<StoredTime> times_;  // rank 0 only
+  Series series_;
 };
 
 }  // namespace corpuscle

@@ -12,6 +12,7 @@
 #include "output/checksum.hpp"
 #include "output/on_root.hpp"
 #include "output/report.hpp"
+#include "output/text_file.hpp"
 
 namespace corpuscle {
 namespace {
@@ -84,11 +85,14 @@ void CheckpointWriter::add(const std::string& name, const Shape& shape, const Sl
   add_part(name, shape, mine, values);
 }
 
+void CheckpointWriter::add_text(const std::string& name, const std::string& text) { file_->write_text(name, text); }
+
 void CheckpointWriter::commit() {
   file_->write_text("arrays", names_);
   file_->attribute("/", "complete", std::int64_t{1});
   file_->close();
   on_root(comm_, [&] {
+    reach_disk(temporary_);
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
     if (error)
@@ -102,8 +106,9 @@ CheckpointReader::CheckpointReader(const std::string& path, const Comm& comm) : 
     throw InputError(fmt::format("{}: this HDF5 file is not a checkpoint of Corpuscle", path));
   const auto version = file_.integer("/", "version");
   if (version != CheckpointHeader::format_version)
-    throw InputError(fmt::format("{}: this checkpoint has format version {}, and this program reads version {}", path,
-                                 version, CheckpointHeader::format_version));
+    throw InputError(fmt::format("{}: this checkpoint has format version {}, and this program reads version {}: it was written by "
+                                 "another version of the program, with which it can be gone on from; or run the case anew",
+                                 path, version, CheckpointHeader::format_version));
   if (!file_.has_attribute("/", "complete"))
     throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
   header_.git = file_.text("/", "git");

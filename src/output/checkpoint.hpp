@@ -11,7 +11,7 @@
 namespace corpuscle {
 
 struct CheckpointHeader {
-  static constexpr int format_version = 2;
+  static constexpr int format_version = 3;
 
   std::string git;             // hash of the program that wrote it; filled in by the writer
   std::string resolved;        // the case, every key with the value used
@@ -39,6 +39,9 @@ class CheckpointWriter {
   void add(const std::string& name, const Shape& shape, const Slab& mine, const double* values);
   void add(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* values);
 
+  /// A text, the same on all ranks.
+  void add_text(const std::string& name, const std::string& text);
+
   /// Finish the file and put it in the place of the previous one.
   void commit();
 
@@ -65,6 +68,8 @@ class CheckpointReader {
   /// @throws InputError  the checkpoint's grid is another one
   void require_grid(const std::array<int, 3>& cells) const;
   bool has(const std::string& name) const { return file_.has(name); }
+  /// @throws InputError  there is no such text
+  std::string text(const std::string& name) const { return file_.read_text(name); }
   Shape shape(const std::string& name) const { return file_.shape(name); }
 
   /// @throws InputError  the array is missing or has another shape than the case needs

@@ -22,7 +22,7 @@ struct CellLabels {
   const std::int8_t* values;
 };
 
-/// Each rank writes its block, collectively; the file is closed and complete between stored times.
+/// Each rank writes its block, collectively.
 class FieldWriter {
  public:
   /// @param nodes       node coordinates of this rank's block, [n2 + 1, n1 + 1, n0 + 1, 3], um
@@ -38,14 +38,13 @@ class FieldWriter {
 
  private:
   void create(const double* nodes);
-  void resume(double restart_us);
-  void rewrite_xdmf() const;
+  void require_same_grid(const std::string& path) const;
+  std::string describe(const StoredTime& time, const Hdf5File& file) const;
   Shape global_cells() const;
 
-  std::string path_, xdmf_path_;
   Comm comm_;
   IndexSpace index_;
-  std::vector<StoredTime> times_;
+  Series series_;
 };
 
 }  // namespace corpuscle

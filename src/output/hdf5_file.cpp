@@ -4,11 +4,16 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <exception>
 #include <filesystem>
 #include <utility>
 
 #include "core/error.hpp"
 #include "output/on_root.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 namespace {
@@ -60,13 +65,22 @@ hid_t access_list(const Comm* comm) {
   return access;
 }
 
-hid_t open_for_writing(const std::string& path, const Comm* comm, bool anew) {
+hid_t create_file(const std::string& path, const Comm* comm) {
   be_quiet();
+  const Comm alone = comm ? *comm : Comm();
+  const bool together = comm && distributed(alone);
+  // The usual obstacles are met by one rank alone, before all open the file together.
+  if (together)
+    on_root(alone, [&] {
+      std::FILE* probe = std::fopen(path.c_str(), "w");
+      if (!probe) throw InputError(fmt::format("{}: cannot create this file: {}", path, std::strerror(errno)));
+      std::fclose(probe);
+    });
   const Handle access(access_list(comm), H5Pclose);
-  const hid_t file =
-      anew ? H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access) : H5Fopen(path.c_str(), H5F_ACC_RDWR, access);
-  if (file < 0)
-    throw InputError(fmt::format("{}: cannot {} this file: {}", path, anew ? "create" : "continue", reason()));
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  std::string failure = file < 0 ? fmt::format("{}: cannot create this file: {}", path, reason()) : "";
+  if (together) failure = agree(alone, failure);
+  if (!failure.empty()) throw InputError(failure);
   return file;
 }
 
@@ -77,20 +91,15 @@ Hdf5File::Hdf5File(std::string path, hid_t file, const Comm* comm) : path_(std::
 }
 
 Hdf5File::Hdf5File(Hdf5File&& other) noexcept
-    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)), comm_(other.comm_) {}
+    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)), failed_(other.failed_), comm_(other.comm_) {}
 
 Hdf5File::~Hdf5File() {
-  if (file_ >= 0) H5Fclose(file_);
+  const bool unsafe = failed_ || (comm_ && std::uncaught_exceptions() > 0);
+  if (file_ >= 0 && !unsafe) H5Fclose(file_);
 }
 
-Hdf5File Hdf5File::create(const std::string& path, const Comm& comm) {
-  return {path, open_for_writing(path, &comm, true), &comm};
-}
-Hdf5File Hdf5File::create(const std::string& path) { return {path, open_for_writing(path, nullptr, true), nullptr}; }
-Hdf5File Hdf5File::extend(const std::string& path, const Comm& comm) {
-  return {path, open_for_writing(path, &comm, false), &comm};
-}
-Hdf5File Hdf5File::extend(const std::string& path) { return {path, open_for_writing(path, nullptr, false), nullptr}; }
+Hdf5File Hdf5File::create(const std::string& path, const Comm& comm) { return {path, create_file(path, &comm), &comm}; }
+Hdf5File Hdf5File::create(const std::string& path) { return {path, create_file(path, nullptr), nullptr}; }
 
 Hdf5File Hdf5File::read(const std::string& path) {
   be_quiet();
@@ -107,18 +116,26 @@ Hdf5File Hdf5File::read(const std::string& path) {
 }
 
 void Hdf5File::close() {
+  if (file_ < 0) return;
+  // Closing waits for all ranks: each makes sure first that its own part has gone out.
+  settle(H5Fflush(file_, H5F_SCOPE_LOCAL) < 0 ? write_failure("the end of this file") : "");
   const hid_t file = std::exchange(file_, -1);
-  if (file < 0) return;
-  const bool flushed = H5Fflush(file, H5F_SCOPE_LOCAL) >= 0;
-  const auto why = flushed ? "" : reason();
-  if (H5Fclose(file) < 0 || !flushed)
-    throw ComputationError(fmt::format("{}: writing failed: {}; free some space or choose another folder with --out",
-                                       path_, flushed ? reason() : why));
+  settle(H5Fclose(file) < 0 ? write_failure("the end of this file") : "");
 }
 
-void Hdf5File::fail_write(const std::string& what) const {
-  throw ComputationError(fmt::format("{}: writing {} failed: {}; free some space or choose another folder with --out",
-                                     path_, what, reason()));
+std::string Hdf5File::write_failure(const std::string& what) const {
+  const auto why = reason();
+  const bool full = why.find("No space left") != std::string::npos || why.find("quota") != std::string::npos;
+  return fmt::format("{}: writing {} failed: {}; {}choose another folder with --out", path_, what, why,
+                     full ? "free some space or " : "");
+}
+
+/// One rank's failure is all ranks'.
+void Hdf5File::settle(const std::string& failure) {
+  const std::string first = comm_ ? agree(*comm_, failure) : failure;
+  if (first.empty()) return;
+  failed_ = true;
+  throw ComputationError(first);
 }
 
 void Hdf5File::fail_read(const std::string& what) const {
@@ -152,7 +169,7 @@ void Hdf5File::write_slab(const std::string& name, const Shape& shape, const Sla
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links, 1);
   const Handle set(H5Dcreate2(file_, name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
-  if (set.bad()) fail_write(name);
+  std::string failure = set.bad() ? write_failure(name) : "";
 
   const Shape origin(shape.size(), 0);
   const Shape& count = mine ? mine->count : shape;
@@ -162,15 +179,16 @@ void Hdf5File::write_slab(const std::string& name, const Shape& shape, const Sla
     H5Sselect_hyperslab(space, H5S_SELECT_SET, mine ? mine->offset.data() : origin.data(), nullptr, count.data(),
                         nullptr);
     H5Sselect_hyperslab(source, H5S_SELECT_SET, origin.data(), nullptr, count.data(), nullptr);
+    if (failure.empty() && (H5Sselect_valid(space) <= 0 || H5Sselect_valid(source) <= 0))
+      failure = fmt::format("{}: writing {} failed: this rank's part lies outside the array", path_, name);
   } else {
     H5Sselect_none(space);
     H5Sselect_none(source);
   }
-  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose);
-#ifdef CORPUSCLE_MPI
-  if (comm_) H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE);
-#endif
-  if (H5Dwrite(set, type, source, space, transfer, data) < 0) fail_write(name);
+  settle(failure);
+  // Each rank writes its part on its own, and what that came to is agreed on: in a collective write that fails on one rank
+  // the others may wait for it for ever (Open MPI 4.1).
+  settle(H5Dwrite(set, type, source, space, H5P_DEFAULT, data) < 0 ? write_failure(name) : "");
 }
 
 void Hdf5File::write(const std::string& name, const Shape& shape, const double* data) {
@@ -215,7 +233,8 @@ void Hdf5File::write_attribute(const std::string& object, const std::string& nam
   const Handle attribute(
       H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
-  if (attribute.bad() || H5Awrite(attribute, type, value) < 0) fail_write("attribute " + name);
+  const bool bad = attribute.bad() || H5Awrite(attribute, type, value) < 0;
+  settle(bad ? write_failure("attribute " + name) : "");
 }
 
 void Hdf5File::attribute(const std::string& object, const std::string& name, double value) {
@@ -242,8 +261,9 @@ bool Hdf5File::has_attribute(const std::string& object, const std::string& name)
   return has(object) && H5Aexists_by_name(file_, object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
-void Hdf5File::remove(const std::string& object) {
-  if (H5Ldelete(file_, object.c_str(), H5P_DEFAULT) < 0) fail_write("removal of " + object);
+void Hdf5File::link(const std::string& name, const std::string& file, const std::string& object) {
+  const bool bad = H5Lcreate_external(file.c_str(), object.c_str(), file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0;
+  settle(bad ? write_failure("link " + name) : "");
 }
 
 std::vector<std::string> Hdf5File::entries(const std::string& group) const {

@@ -3,6 +3,9 @@
 // HDF5 itself cannot recover from a write that fails: the file can then not be closed, and the library brings the
 // process down when MPI is finalised. So space is asked for before each write, and a program that has met a failed
 // write all the same should end without finalising MPI.
+//
+// Several ranks write one file together, and a rank that fails must not leave the others waiting in a collective call:
+// what can fail on one rank alone is agreed on before each of these, and a file that has failed is never closed.
 #pragma once
 
 #ifdef CORPUSCLE_HDF5
@@ -27,20 +30,19 @@ struct Slab {
 
 class Hdf5File {
  public:
-  /// A new file, or one to extend. With a communicator of several ranks every call below is collective.
-  /// @throws InputError  the file cannot be created or opened
+  /// A new file. With a communicator of several ranks every call below is collective.
+  /// @throws InputError  on every rank: the file cannot be created
   static Hdf5File create(const std::string& path, const Comm& comm);
   static Hdf5File create(const std::string& path);
-  static Hdf5File extend(const std::string& path, const Comm& comm);
-  static Hdf5File extend(const std::string& path);
   /// For reading, by each rank on its own.
   /// @throws InputError  the file is missing, empty, not HDF5, or cut short
   static Hdf5File read(const std::string& path);
 
   Hdf5File(Hdf5File&& other) noexcept;
   Hdf5File& operator=(Hdf5File&&) = delete;
+  /// Closes the file, unless an error is on its way or several ranks would have to do it together after one.
   ~Hdf5File();
-  /// @throws ComputationError  what was written did not reach the disk
+  /// @throws ComputationError  on every rank: what was written did not reach the disk
   void close();
 
   /// A whole data set, the same on all ranks. Groups in the name are created.
@@ -61,9 +63,11 @@ class Hdf5File {
   void attribute(const std::string& object, const std::string& name, std::int64_t value);
   void attribute(const std::string& object, const std::string& name, const std::string& value);
 
+  /// A link to an object of another file, whose path is relative to this one's folder.
+  void link(const std::string& name, const std::string& file, const std::string& object);
+
   bool has(const std::string& object) const;
   bool has_attribute(const std::string& object, const std::string& name) const;
-  void remove(const std::string& object);
   std::vector<std::string> entries(const std::string& group) const;
   Shape shape(const std::string& name) const;
   bool is_integer(const std::string& name) const;
@@ -89,11 +93,13 @@ class Hdf5File {
   void read_slab(const std::string& name, const Slab* part, hid_t type, void* data) const;
   void write_attribute(const std::string& object, const std::string& name, hid_t type, const void* value);
   void read_attribute(const std::string& object, const std::string& name, hid_t type, void* value) const;
-  [[noreturn]] void fail_write(const std::string& what) const;
+  std::string write_failure(const std::string& what) const;
+  void settle(const std::string& failure);
   [[noreturn]] void fail_read(const std::string& what) const;
 
   std::string path_;
   hid_t file_;
+  bool failed_ = false;       // beyond repair: left open until the program ends
   std::optional<Comm> comm_;  // of several ranks, whose calls are collective; absent: this process alone
 };
 

@@ -68,12 +68,15 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["git"] = git_hash();
   json["backend"] = backend_name();
   json["kokkos"] = kokkos_configuration();
-  json["ranks"] = comm.size();
+  json["ranks"] = report.ranks > 0 ? report.ranks : comm.size();
+  if (!report.stopped.empty()) json["stopped"] = report.stopped;
+  if (!report.broke_down.empty()) json["broke_down"] = report.broke_down;
   json["threads"] = thread_count();
   json["modules"] = {{"active", report.active}, {"left_out", report.left_out}, {"left_out_cost", report.left_out_cost}};
   json["steps"] = report.steps;
   json["simulated_us"] = report.simulated_us;
   json["wall_s"] = report.wall_s;
+  json["wall_s_this_run"] = report.wall_s_this_run > 0 ? report.wall_s_this_run : report.wall_s;
   json["wall_s_by_part"] = nlohmann::json::object();
   for (const auto& [part, seconds] : report.wall_s_by_part) json["wall_s_by_part"][part] = comm.max(seconds);
   json["peak_rss_mb"] = comm.sum(peak_rss_mb());

@@ -25,12 +25,16 @@ struct Tally {
 
 struct Report {
   std::string case_path, title;
+  std::string stopped;     // by which signal, or because of what; empty: it ran to its end
+  std::string broke_down;  // the message; empty: it did not
+  int ranks = 0;  // 0: those that write the report
   std::string resolved;                       // every key with the value used, as TOML
   std::vector<std::string> active, left_out;  // modules
   nlohmann::json left_out_cost = nlohmann::json::object();  // by module, where known: kernels_per_step, memory_mb
   long steps = 0;
   double simulated_us = 0;
-  double wall_s = 0;
+  double wall_s = 0;                             // with the runs that this one goes on from
+  double wall_s_this_run = 0;                    // 0: the same
   std::map<std::string, double> wall_s_by_part;  // of this rank; all ranks have the same parts
   Tally momentum_iterations, pressure_iterations, projections, coupling_iterations, membrane_substeps;
   /// Error measures by name; those of the contract that a run does not have are written as null.

@@ -1,6 +1,8 @@
 #include "output/text_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -38,10 +40,10 @@ void TextFile::close() {
 }
 
 void TextFile::fail() {
-  throw ComputationError(
-      fmt::format("{}: writing failed: {}; {} bytes of it were written before. Free some space or choose another "
-                  "folder with --out.",
-                  path_, std::strerror(errno), written_));
+  const int why = errno;
+  throw ComputationError(fmt::format("{}: writing failed: {}; {} bytes of it were written before. {} another folder with --out.", path_,
+                                     std::strerror(why), written_,
+                                     why == ENOSPC || why == EDQUOT ? "Free some space or choose" : "Choose"));
 }
 
 void replace_text_file(const std::string& path, const std::string& text) {
@@ -52,6 +54,13 @@ void replace_text_file(const std::string& path, const std::string& text) {
   std::error_code error;
   fs::rename(temporary, path, error);
   if (error) throw InputError(fmt::format("{}: cannot write this file: {}", path, error.message()));
+}
+
+void reach_disk(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return;
+  ::fsync(file);
+  ::close(file);
 }
 
 void prepare_folder(const std::string& folder) {

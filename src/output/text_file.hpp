@@ -31,6 +31,9 @@ class TextFile {
 /// Write a whole file under another name and rename it, so that readers see the old or the new one, never a part.
 void replace_text_file(const std::string& path, const std::string& text);
 
+/// Wait until a closed file is on the disk, so that a rename cannot overtake what is in it when power fails.
+void reach_disk(const std::string& path);
+
 /// Create the folder for the results if it is not there, and make sure that files can be written in it.
 /// @throws InputError  saying why not
 void prepare_folder(const std::string& folder);

@@ -73,6 +73,8 @@ using Words = std::vector<std::string>;
 struct Launch {
   int threads = 1, ranks = 1;
   std::string waiting = "OMP_WAIT_POLICY=passive";  // options and variables for env
+  bool overwrite = true;   // results that an earlier run of the test has left in the folder of --out
+  std::string before = {}; // shell commands of each rank before it starts, such as a limit on the size of files
 };
 
 struct Outcome {
@@ -80,16 +82,26 @@ struct Outcome {
   std::string output;  // what went to the screen
 };
 
-/// Run the program in `folder` and wait for it. Unless told otherwise its threads yield while they wait: on a machine with other work, or
-/// with one core, they would spend most of their time in each other's way.
-inline Outcome start(const fs::path& folder, const Words& words, const Launch& launch = {}) {
-  std::string command = "cd " + quoted(folder.string()) + " && timeout 120 env" + without_mpi_environment() +
-                        " " + launch.waiting + " OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
+/// The command line that runs the program in `folder`, its screen in screen.txt there. Unless told otherwise
+/// its threads yield while they wait: on a machine with other work, or with one core, they would spend most of their time in each other's way.
+/// @param limit  what stops it after a time, such as "timeout 120", or nothing
+inline std::string command_line(const fs::path& folder, const Words& words, const Launch& launch, const std::string& limit) {
+  const auto has = [&](const char* word) { return std::find(words.begin(), words.end(), word) != words.end(); };
+  std::string command = "cd " + quoted(folder.string()) + " && exec " + limit + " env" +
+                        without_mpi_environment() + " " + launch.waiting + " OMP_NUM_THREADS=" +
+                        std::to_string(launch.threads) + " ";
   if (launch.ranks > 1)
     command += "mpirun -n " + std::to_string(launch.ranks) + " --oversubscribe --allow-run-as-root ";
-  command += quoted(CORPUSCLE_PROGRAM);
-  for (const auto& word : words) command += " " + quoted(word);
-  const int status = std::system((command + " > screen.txt 2>&1 < /dev/null").c_str());
+  std::string program = quoted(CORPUSCLE_PROGRAM);
+  for (const auto& word : words) program += " " + quoted(word);
+  if (launch.overwrite && has("run") && has("--out") && !has("--restart")) program += " --overwrite";
+  if (!launch.before.empty()) program = "sh -c " + quoted(launch.before + "; exec " + program);
+  return command + program + " > screen.txt 2>&1 < /dev/null";
+}
+
+/// Run the program in `folder` and wait for it.
+inline Outcome start(const fs::path& folder, const Words& words, const Launch& launch = {}) {
+  const int status = std::system(command_line(folder, words, launch, "timeout 120").c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(folder / "screen.txt")};
 }
 

@@ -112,7 +112,7 @@ TEST_CASE("fields written by all ranks are those of the whole grid", "[ranks]") 
 
   const auto xdmf = test::contents(folder / "fields.xdmf");
   REQUIRE_THAT(xdmf, Contains("Time Value=\"0\"") && Contains("Time Value=\"2.5\"") && Contains("3DSMesh") &&
-                         Contains("Dimensions=\"13 6 5\"") && Contains("fields.h5:/step_000000005/velocity_um_per_us"));
+                         Contains("Dimensions=\"13 6 5\"") && Contains("fields/step_000000005.h5:/velocity_um_per_us"));
 }
 
 TEST_CASE("a restart keeps stored times up to its own and appends", "[ranks]") {
@@ -179,7 +179,7 @@ TEST_CASE("cells.h5 holds surfaces and their values", "[ranks]") {
   file.read("triangles", stored.data());
   REQUIRE(stored == triangles);
   REQUIRE_THAT(test::contents(folder / "cells.xdmf"),
-               Contains("Time Value=\"7.25\"") && Contains("cells.h5:/step_000000003/traction_kPa"));
+               Contains("Time Value=\"7.25\"") && Contains("cells/step_000000003.h5:/traction_kPa"));
 }
 
 TEST_CASE("a checkpoint reads back bit for bit, on any split of the grid", "[ranks]") {
@@ -280,11 +280,11 @@ TEST_CASE("broken and foreign checkpoints are refused by name and fault") {
     file.attribute("/", "format", "Corpuscle checkpoint");
     file.attribute("/", "version", std::int64_t{1});
   }
-  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 2"));
+  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 3") && Contains("another version of the program"));
   {
     auto file = Hdf5File::create(bad.string());
     file.attribute("/", "format", "Corpuscle checkpoint");
-    file.attribute("/", "version", std::int64_t{2});
+    file.attribute("/", "version", std::int64_t{CheckpointHeader::format_version});
   }
   REQUIRE_THAT(read_error(bad), Contains("was not finished"));
 }
@@ -334,6 +334,19 @@ TEST_CASE("a checkpoint that was not finished leaves the last good one", "[ranks
   comm.barrier();
   REQUIRE(test::contents(path) == before);
   REQUIRE_FALSE(fs::exists(path + ".part"));
+}
+
+TEST_CASE("what one rank cannot write is an error on all ranks", "[ranks]") {
+  const auto folder = test::fresh_folder("one_rank");
+  const Comm comm;
+  const hsize_t rank = static_cast<hsize_t>(comm.rank()), ranks = static_cast<hsize_t>(comm.size());
+  const double value = 1;
+  const auto message = test::message_of<ComputationError>([&] {
+    auto file = Hdf5File::create((folder / "file.h5").string(), comm);
+    file.write("good", {ranks}, Slab{{rank}, {1}}, &value);
+    file.write("bad", {ranks}, Slab{{rank + 1}, {1}}, &value);  // beyond the end on the last rank alone
+  });
+  REQUIRE_THAT(message, Contains("file.h5: writing bad failed") && Contains("outside the array"));
 }
 
 TEST_CASE("a full disk: what does not fit is refused with sizes, and the last good checkpoint stays", "[ranks]") {

@@ -1,0 +1,172 @@
+#include "app/flow_output.hpp"
+#include "app/modules.hpp"
+#include "app/scene_runs.hpp"
+#include "app/stop_signal.hpp"
+#include "app/waiting.hpp"
+#include "core/error.hpp"
+#include "core/log.hpp"
+#include "coupling/restart.hpp"
+#include "output/on_root.hpp"
+#include "parallel/agree.hpp"
+
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+
+namespace corpuscle {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+#ifdef CORPUSCLE_HDF5
+RunTotals totals_of(const std::string& path, const Restored& restored) {
+  try {
+    return totals_from(restored.totals);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path, error.what()));
+  }
+}
+#endif
+
+void print_coupling(FlowSimulation& simulation) {
+  if (!simulation.membranes()) return;
+  const auto s = *simulation.coupling()->stability(simulation.next_step_us());
+  info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
+       s.mass_term, s.beta, s.threshold(), s.margin());
+  const int substeps = simulation.membranes()->substeps(simulation.next_step_us(), s.beta);
+  if (substeps > 1)
+    info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
+         simulation.membranes()->stable_step_us());
+}
+
+/// @return what the report has counted until the checkpoint; none without a restart
+std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoint, FlowSimulation& simulation) {
+  if (checkpoint.empty()) return std::nullopt;
+#ifdef CORPUSCLE_HDF5
+  const Restored restored = read_checkpoint(checkpoint, simulation, scene.resolved);
+  const auto totals = totals_of(checkpoint, restored);
+  info("continuing from {:.6g} us", simulation.time());
+  for (const auto& change : restored.changes)
+    warn("{} = {}, and it was {} until the checkpoint", change.key, change.now, change.before);
+  if (simulation.done())
+    throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint,
+                                 simulation.time()));
+  return totals;
+#else
+  (void)scene, (void)simulation;
+  throw InputError("--restart: this build has no HDF5, so it has no checkpoints; configure with -DCORPUSCLE_HDF5=ON");
+#endif
+}
+
+/// A report of what was done before the computation broke down: by all ranks, or where some are stuck by those that are
+/// not.
+/// @param output  null if it could not even begin
+void report_breakdown(const Comm& comm, const std::string& folder, FlowOutput* output, Report& report) {
+  try {
+    const bool together = all_here(comm);
+    if (output) output->fill_broken(report, together);
+#ifdef CORPUSCLE_MPI
+    write_report(folder, together ? comm : Comm(MPI_COMM_SELF), report);
+#else
+    write_report(folder, comm, report);
+#endif
+  } catch (const std::exception&) {  // a full disk, perhaps: the error that is on its way says so
+  }
+}
+
+/// Steps until the end, a signal, or a cell at the outflow.
+/// @return the signal, or an empty text
+std::string advance(FlowSimulation& simulation, FlowOutput& output, StopSignal& signal, Progress& progress) {
+  const long first = simulation.steps();
+  while (!simulation.done()) {
+    if (const auto name = signal.asked(); !name.empty()) return name;
+    simulation.step();
+    output.after_step();
+    progress.update(simulation.steps() - first, simulation.time());
+    if (simulation.at_outflow()) break;
+  }
+  return "";
+}
+
+}  // namespace
+
+Report start_report(const Comm& comm, const Case& scene) {
+  Report report;
+  report.ranks = comm.size();
+  report.case_path = scene.path;
+  report.title = scene.title;
+  report.resolved = scene.resolved;
+  report.extra["waiting"] = waiting_policy();
+  const auto modules = list_modules(scene, comm.size());
+  report.active = modules.active;
+  report.left_out = modules.left_out;
+  for (const auto& [name, cost] : modules.cost)
+    report.left_out_cost[name] = {{"kernels_per_step", cost.kernels}, {"memory_mb", cost.megabytes}};
+  return report;
+}
+
+/// Where steps change their length.
+void print_schedule(const StepSchedule& schedule) {
+  const auto lengths = schedule.lengths_us();
+  if (lengths.size() == 1) return;
+  std::string text = fmt::format("{:g} us", lengths[0]);
+  for (std::size_t n = 1; n < lengths.size(); ++n) {
+    const double from = StepSchedule::steps_per_length * lengths[n];
+    if (from < schedule.time_us(schedule.end())) text += fmt::format(", {:g} us from {:g} us on", lengths[n], from);
+  }
+  const auto again = schedule.restarts_us();
+  if (!again.empty()) text += fmt::format("; as from the start at {:g} us, where the inflow changes", fmt::join(again, ", "));
+  info("steps: {}; {} in all", text, schedule.steps_from(0));
+}
+
+Ending run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const Place& place) {
+  const auto start = Clock::now();
+  Timers timers;
+  StopSignal signal(comm);
+  FlowSimulation simulation(comm, scene, timers);
+  print_schedule(simulation.schedule());
+  print_coupling(simulation);
+  const auto totals = restart(scene, options.restart, simulation);
+  place.begin();
+  Ending ending{exit_done, start_report(comm, scene)};
+  Report& report = ending.report;
+  std::unique_ptr<FlowOutput> output;
+  Progress progress(scene.time.end_us, simulation.steps_left());
+  try {
+    output = std::make_unique<FlowOutput>(place.folder, scene, simulation, timers,
+                                          totals ? std::optional(simulation.time()) : std::nullopt, start);
+    if (totals) {
+      on_root(comm, [&] { std::filesystem::remove(place.folder + "/report.json"); });  // of the run until the checkpoint
+      output->started_from(options.restart, *totals);
+    } else {
+      output->after_step(true);
+    }
+    report.stopped = advance(simulation, *output, signal, progress);
+    progress.finish();
+    if (!report.stopped.empty()) output->stop();
+  } catch (const std::exception& error) {
+    progress.finish();
+    if (!output && dynamic_cast<const InputError*>(&error)) throw;  // results that this case cannot go on from
+    report.broke_down = fmt::format("at {:.6g} us (step {}): {}", simulation.time() + simulation.next_step_us(),
+                                    simulation.steps() + 1, error.what());
+    report_breakdown(comm, place.folder, output.get(), report);
+    const bool checkpoint = output && !output->last_checkpoint().empty();
+    const std::string coarse = simulation.coupling() ? simulation.coupling()->coarse() : "";
+    throw ComputationError(fmt::format("{}. {}Last good checkpoint: {}", report.broke_down,
+                                       coarse.empty() ? "" : "But first: " + coarse + ". ",
+                                       checkpoint ? output->last_checkpoint() : "none yet (output.checkpoint_every_us)"));
+  }
+  if (!report.stopped.empty()) {
+    ending.code = exit_stopped;
+  } else if (!simulation.done() && simulation.at_outflow()) {
+    ending.code = exit_at_outflow;
+    report.stopped = simulation.outflow_message();
+  }
+  output->fill(report);
+  write_report(place.folder, comm, report);
+  return ending;
+}
+
+}  // namespace corpuscle

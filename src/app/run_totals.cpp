@@ -1,0 +1,43 @@
+#include "app/run_totals.hpp"
+
+#include "core/error.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace corpuscle {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Tally, samples, sum, largest)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ImmersedReport, classifications, immersed, inside, isolated, uncovered,
+                                   velocity_fallbacks, least_wall_spacings, least_body_spacings)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyTotals, boundaries, gradient, dissipation, kinetic, on_cells, on_bodies, elastic,
+                                   membrane_dissipation, membrane_kinetic)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, driving_pressure, time, samples)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
+                                   volume_drift, area_drift, slip, splitting, immersed, energy, wall_s, wall_s_by_part)
+
+namespace {
+
+/// JSON has no word for what is not a number: it writes null.
+void read_nulls(nlohmann::json& value) {
+  if (value.is_null()) value = std::nan("");
+  if (value.is_structured())
+    for (auto& entry : value) read_nulls(entry);
+}
+
+}  // namespace
+
+std::string to_text(const RunTotals& totals) { return nlohmann::json(totals).dump(); }
+
+RunTotals totals_from(const std::string& text) {
+  try {
+    auto json = nlohmann::json::parse(text);
+    read_nulls(json);
+    return json.get<RunTotals>();
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(fmt::format("'totals' is damaged: {}", error.what()));
+  }
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,49 @@
+// The folder of a run's results: found or made, locked, and not touched before the run is sure to begin.
+#pragma once
+
+#include <string>
+
+#include "parallel/comm.hpp"
+
+namespace corpuscle {
+
+/// What a run may do with results that are there already.
+enum class EarlierResults { refuse, overwrite, go_on };
+
+class RunFolder {
+ public:
+  /// Claims the folder for as long as this lives; rank 0 does the work.
+  /// @param named      by the user; empty: runs/<case_name>-001 or the first number that is free
+  /// @throws InputError  on every rank: it cannot be made or written in, another run uses it, or it holds results that
+  ///                     `earlier` does not allow for
+  RunFolder(const Comm& comm, const std::string& named, const std::string& case_name, EarlierResults earlier);
+  /// Gives the folder back; if the run never began, it is as it was before.
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+  /// The run begins: results to be overwritten are removed, and runs/latest leads here if the folder is a numbered one.
+  void begin();
+
+ private:
+  void claim(const std::string& named, const std::string& case_name);
+  void make(const std::string& path);
+  void make_numbered(const std::string& case_name);
+  void lock();
+  void refuse_shared(const std::string& path, int why);
+  void give_back();
+  void point_latest() const;
+
+  Comm comm_;
+  std::string path_;
+  EarlierResults earlier_;
+  std::string first_made_;  // outermost folder that did not exist before; empty: all did
+  bool numbered_ = false, begun_ = false;
+  int lock_ = -1;
+};
+
+/// Remove what an earlier run has written in a folder, and nothing else.
+void remove_results(const std::string& folder);
+
+}  // namespace corpuscle
