@@ -29,7 +29,7 @@ TEST_CASE("the smallest spacing at a surface is that of the grid beside it, wher
     }
     const SurfaceSet surfaces = make_surface_set({mesh});
     Timers timers;
-    ImmersedFlow flow(fluid, surfaces, timers);
+    ImmersedFlow flow(fluid, surfaces, {}, timers);
     flow.update_geometry(0.5);
     INFO("centre at " << at << " um");
     // Nearest in index space, not in space: one node off where a vertex lies half-way, and cells grow by up to 13 %.
