@@ -89,8 +89,8 @@ def run(case, overrides=None, folder=None, threads=1, ranks=1, timeout_s=None, o
     else:
         file = ROOT / "cases" / case if (ROOT / "cases" / str(case)).exists() else pathlib.Path(case)
     command = [str(path or program()), "run", str(file), "--out", str(folder), *options]
-    if "--restart" not in options:
-        command.append("--overwrite")
+    if "--restart" not in options and str(path or program()) == str(program()):
+        command.append("--overwrite")  # another program may be one from before there was such an option
     for key, value in (overrides or {}).items():
         command += ["--set", f"{key}={toml(value)}"]
     # Threads that are bound would be bound to the same cores as those of other runs beside this one.
