@@ -2,9 +2,15 @@
 
 #include <unistd.h>
 
+#if defined(__linux__) && defined(_OPENMP)
+#include <omp.h>
+#include <sched.h>
+#endif
+
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <vector>
 
 namespace corpuscle {
 
@@ -40,6 +46,28 @@ long spins() {
   return std::clamp(static_cast<long>(spin_us * sample / std::max(shortest_us, 1e-3)), 100L, 20000L);
 }
 
+#if defined(__linux__) && defined(_OPENMP)
+/// Where threads are to be bound (OMP_PROC_BIND, OMP_PLACES), the run time has bound this first one to its place already, and
+/// the program started anew would take that place for the whole machine.
+void give_back_places() {
+  std::vector<int> processors;
+  for (int place = 0; place < omp_get_num_places(); ++place) {
+    std::vector<int> here(omp_get_place_num_procs(place));
+    omp_get_place_proc_ids(place, here.data());
+    processors.insert(processors.end(), here.begin(), here.end());
+  }
+  if (processors.empty()) return;
+  const int count = *std::max_element(processors.begin(), processors.end()) + 1;
+  cpu_set_t* set = CPU_ALLOC(count);
+  if (!set) return;
+  const auto bytes = CPU_ALLOC_SIZE(count);
+  CPU_ZERO_S(bytes, set);
+  for (const int processor : processors) CPU_SET_S(processor, bytes, set);
+  sched_setaffinity(0, bytes, set);
+  CPU_FREE(set);
+}
+#endif
+
 }  // namespace
 
 void wait_briefly([[maybe_unused]] char** argv) {
@@ -50,6 +78,7 @@ void wait_briefly([[maybe_unused]] char** argv) {
   if (threads && std::string(threads) == "1") return;
   setenv("GOMP_SPINCOUNT", std::to_string(spins()).c_str(), 0);
   setenv("KMP_BLOCKTIME", "0", 0);
+  give_back_places();
   execv("/proc/self/exe", argv);  // if it fails, the run goes on as it is, and waits longer
   unsetenv("GOMP_SPINCOUNT");
 #endif

@@ -59,6 +59,18 @@ TEST_CASE("waiting is set before the run time of the threads starts") {
   }
 }
 
+TEST_CASE("threads bound to processors keep all of them") {
+  const auto folder = fresh_folder("waiting_bound");
+  const auto words = with({"run", scene("stretch"), "--out", "out"}, short_stretch);
+  const auto outcome = succeed(folder, words, plainly(2, "OMP_PROC_BIND=true OMP_DISPLAY_ENV=VERBOSE"));
+  // Places as they were found at either start of the program; only GNU's run time lists them.
+  std::vector<std::string> places;
+  const std::string key = "OMP_PLACES = '";
+  for (auto at = outcome.output.find(key); at != std::string::npos; at = outcome.output.find(key, at + 1))
+    places.push_back(outcome.output.substr(at, outcome.output.find('\n', at) - at));
+  if (places.size() > 1) CHECK(places.front() == places.back());
+}
+
 TEST_CASE("what the user says about waiting holds") {
   const auto folder = fresh_folder("waiting_of_user");
   const auto words = with({"run", scene("stretch"), "--out", "out"}, short_stretch);
