@@ -274,6 +274,7 @@ struct StencilInput {
   PseudoNormals normals;
   BandViews band;
   NodeViews nodes;
+  Array<std::int8_t> extended;  // [cell] whether an immersed node gets a pressure from fluid nodes, halos filled
 };
 
 KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row& row, RowKind kind,
@@ -313,7 +314,7 @@ inline void build_velocity_rows(const StencilInput& input, int count, const Sten
 }
 
 /// Pressure rows of `count` immersed nodes (fluid nodes only, no surface value); counts[row_kinds .. 2 row_kinds).
-/// Exact for linear pressures. A row of kind surface_only is empty.
+/// Exact for linear pressures. A row of kind surface_only is empty. Sets input.extended at these nodes.
 inline void build_pressure_rows(const StencilInput& input, int count,
                                 const StencilViews& rows, const Array<int>& counts) {
   const StencilInput in = input;
@@ -325,6 +326,7 @@ inline void build_pressure_rows(const StencilInput& input, int count,
         Row row;
         const RowKind kind = pressure_row(allowed, p, row);
         write_row(out, n, row, kind, counts, row_kinds);
+        in.extended(out.node(n)) = row.count > 0 ? 1 : 0;
       });
 }
 

@@ -54,6 +54,8 @@ class Coupling {
   /// What the next step depends on beyond the flow and the bodies' positions and velocities, for restarts.
   virtual std::vector<double> state() const { return {}; }
   virtual void set_state(const std::vector<double>&) {}
+  /// A checkpoint's state is in place, whose last step ended at `time_us`.
+  virtual void resume(double /*time_us*/) {}
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
 

@@ -66,7 +66,7 @@ void FlowSimulation::resume(const Progress& progress) {
     throw InputError(fmt::format("no step of this case begins at {} us, where the checkpoint is: use another time.step_us or "
                                  "time.first_step_us", progress.time));
   constexpr double most = 2;  // beyond 1 + sqrt(2), errors of second-order backward differences grow (Hairer et al., III.5)
-  if (next_step_us() > most * progress.last_step * (1 + 1e-9))
+  if (progress.steps > 0 && next_step_us() > most * progress.last_step * (1 + 1e-9))
     throw InputError(fmt::format("the step can at most double at a restart: the checkpoint was written with steps of {} us, and "
                                  "this case goes on with {} us; reduce time.step_us", progress.last_step, next_step_us()));
   time_ = schedule_.time_us(tick_);

@@ -213,7 +213,8 @@ StepStatistics IteratedCoupling::advance(double time, double dt) {
     mean_velocity(n, surfaces_->x, x_start_, dt, v_answer_);
     const auto norms = interface_residual(n, v_answer_, v_interface_, previous_residual_, residual_);
     statistics.coupling_iterations = k + 1;
-    residual = std::sqrt(norms.residual / std::max(norms.answer, n * quiet_speed_ * quiet_speed_));
+    // The ranks' sums may differ by round-off; that they end in the same pass may not depend on it.
+    residual = fluid_.grid().comm().max(std::sqrt(norms.residual / std::max(norms.answer, n * quiet_speed_ * quiet_speed_)));
     statistics.coupling_residual = residual;
     if (!std::isfinite(residual)) break;
     if (residual <= coupling.tolerance) return statistics;

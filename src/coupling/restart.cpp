@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace corpuscle {
 
 namespace {
@@ -146,13 +148,15 @@ FluidState read_fluid(const CheckpointReader& file, FlowSimulation& simulation) 
     if (state.flux_old[d].data() && file.has(old_flux_name(d))) {
       file.read(old_flux_name(d), face_shape(index, d), slab, flux.data());
       set_box_values(index, faces, flux, state.flux_old[d]);
+    } else if (state.flux_old[d].data()) {  // written without convection: as if the flow had been the same a step before
+      Kokkos::deep_copy(state.flux_old[d], state.flux[d]);
     }
   }
   return state;
 }
 
 /// Nodes are classified as they were in the last step, and then the surfaces put where that step left them.
-void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
+void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation, bool cells_changed) {
   const SurfaceSet& surfaces = *simulation.surfaces();
   std::vector<double> positions(3 * static_cast<std::size_t>(surfaces.vertices));
   file.read("classified_positions", {positions.size() / 3, 3}, positions.data());
@@ -172,6 +176,7 @@ void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());
     simulation.membranes()->set_state(membranes);
+    if (cells_changed) simulation.membranes()->forget_stiffness();
   }
 }
 
@@ -187,7 +192,9 @@ Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, co
   std::int64_t levels = 0;
   file.read("numbers", {2}, numbers);
   file.read("history_levels", {1}, &levels);
-  if (simulation.immersed()) read_surfaces(file, simulation);
+  const bool cells_changed = std::any_of(restored.changes.begin(), restored.changes.end(),
+                                         [](const CaseChange& change) { return change.key.rfind("cell", 0) == 0; });
+  if (simulation.immersed()) read_surfaces(file, simulation, cells_changed);
   try {
     simulation.resume({file.header().time_us, numbers[1], file.header().step});
   } catch (const InputError& error) {
@@ -199,6 +206,7 @@ Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, co
   state.step_us = numbers[1];
   state.history_levels = static_cast<int>(levels);
   simulation.fluid().restore(state);
+  if (simulation.coupling() && file.header().step > 0) simulation.coupling()->resume(file.header().time_us);
   restored.totals = file.text("totals");
   return restored;
 }

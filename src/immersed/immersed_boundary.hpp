@@ -118,7 +118,7 @@ class ImmersedBoundary {
   NearBodies bodies_near(int node) const;
 
  private:
-  StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
+  StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_, extended_}; }
   NodeBox read_places();
   void classify_nodes(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
@@ -142,6 +142,7 @@ class ImmersedBoundary {
   NodeViews nodes_;
   Array<NodeKind> previous_kind_;
   Array<std::int8_t> reached_;
+  Array<std::int8_t> extended_;  // see StencilInput
   Array<int> node_counts_, row_counts_, traction_counts_;
   Array<Key> least_gap_;  // empty where there is only one body
   HostCopy<Array<int>> box_host_, node_counts_host_, row_counts_host_;

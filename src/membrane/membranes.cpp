@@ -20,7 +20,7 @@ constexpr int power_iterations = 30;  // gives the largest eigenvalue to about 5
 constexpr double step_margin = 0.3;   // of the largest stable step: links stiffen up to fivefold before they break
 constexpr double volume_rate = 1e-3;  // share of V0 per us by which a cell that starts away from V0 is brought there
 constexpr int most_retries = 4;
-constexpr int most_substeps = 1000000;
+constexpr int most_substeps = 10000;  // a minute or so for one cell
 
 }  // namespace
 
@@ -98,8 +98,8 @@ int Membranes::substeps(double dt_us, double beta) const {
   if (!(count <= most_substeps)) {
     throw ComputationError(
         fmt::format("membrane: a step of {:.3g} us would take {:.3g} sub-steps of {:.3g} us; reduce "
-                    "time.step_us or raise cells.mass_pg",
-                    dt_us, count, step));
+                    "time.step_us or raise cells.mass_pg ({} are the most)",
+                    dt_us, count, step, most_substeps));
   }
   return std::max(1, int(count));
 }
@@ -142,7 +142,7 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
   if (beta > 0 && (stress.values.extent(0) == 0 || v_star.extent(0) == 0)) {
     throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both stress and v_star");
   }
-  if (calls_ % estimate_period == 0) estimate_stiffness();
+  if (calls_ % estimate_period == 0 || stiffness_.empty()) estimate_stiffness();
   ++calls_;
   // The solver of the volume constraint starts from nothing, so that a step depends on the state alone.
   if (viscosity_) Kokkos::deep_copy(motion_.direction, 0.0);

@@ -88,6 +88,9 @@ class Membranes {
   /// One entry a cell. Copies from the device: for output, not for every sub-step.
   std::vector<CellDiagnostics> diagnostics();
 
+  /// Estimate the stiffness anew at the next advance(): the cells' constants are not those of the state.
+  void forget_stiffness() { stiffness_.clear(); }
+
   /// Kinetic energy of all cells' membranes, fJ, and the power that membrane viscosity takes from them, nW.
   double kinetic_energy_fJ() const;
   double dissipation_nW() const;
