@@ -8,13 +8,14 @@
 namespace corpuscle {
 namespace {
 
-/// A thick cone with a cavity that a channel narrower than the grid's spacing joins to the outside: a profile turned about z.
-TriangleMesh bottle() {
+using Profile = std::vector<std::array<double, 2>>;  // corners (r, z), from the axis around to the axis
+
+/// A profile turned about z.
+TriangleMesh turned(const Profile& corner) {
   constexpr int around = 48;
-  const double corner[][2] = {{0, -13.55}, {5, -13.55}, {5, -11.45}, {0.6, -11.45}, {0.6, 1.3}, {2, 1.8}, {14, -14}, {0, -18}};
-  std::vector<std::array<double, 2>> profile{{corner[0][0], corner[0][1]}};
-  for (int n = 1; n < 8; ++n) {
-    const double *a = corner[n - 1], *b = corner[n];
+  Profile profile{corner[0]};
+  for (std::size_t n = 1; n < corner.size(); ++n) {
+    const auto &a = corner[n - 1], &b = corner[n];
     const int pieces = std::max(1, static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]))));
     for (int i = 1; i <= pieces; ++i)
       profile.push_back({a[0] + (b[0] - a[0]) * i / pieces, a[1] + (b[1] - a[1]) * i / pieces});
@@ -39,6 +40,11 @@ TriangleMesh bottle() {
   return mesh;
 }
 
+/// A thick cone with a cavity that a channel narrower than the grid's spacing joins to the outside; one with a channel of two
+/// nodes across that is closed at its end, all of it within the band beside the surface.
+const Profile bottle{{0, -13.55}, {5, -13.55}, {5, -11.45}, {0.6, -11.45}, {0.6, 1.3}, {2, 1.8}, {14, -14}, {0, -18}};
+const Profile cup{{0, -13.55}, {1.6, -13.55}, {1.6, 9.3}, {3, 9.8}, {14, -14}, {0, -18}};
+
 }  // namespace
 
 TEST_CASE("fluid that a body closes in is found on any number of ranks, and its pressure counts nowhere", "[coupling][ranks]") {
@@ -49,8 +55,14 @@ TEST_CASE("fluid that a body closes in is found on any number of ranks, and its 
   sides[4].type = BoundarySettings::Type::velocity_inlet, sides[4].speed = 2e-3;
   sides[5].type = BoundarySettings::Type::outflow;
   FluidSolver fluid(grid, FluidSettings{}, sides);
-  const SurfaceSet surfaces = make_surface_set({bottle()});
   Timers timers;
+  {  // A rank that holds the bottom of the cup does not know that it is open.
+    const SurfaceSet surfaces = make_surface_set({turned(cup)});
+    ImmersedFlow flow(fluid, surfaces, {}, timers);
+    flow.update_geometry(0.5);
+    CHECK(grid.comm().sum(static_cast<long>(flow.boundary().counts().isolated)) == 0);
+  }
+  const SurfaceSet surfaces = make_surface_set({turned(bottle)});
   ImmersedFlow flow(fluid, surfaces, {}, timers);
   flow.update_geometry(0.5);
   // As on one rank: 52 nodes of the cavity and of the channel.
