@@ -79,6 +79,7 @@ std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds
   }
   std::stringstream list(kinds);
   for (std::string kind; std::getline(list, kind, ',');) {
+    if (std::any_of(runs.begin(), runs.end(), [&](const CoarserRun& run) { return run.kind == kind; })) continue;
     if (kind == "spacing") {
       runs.push_back(doubled_spacing(scene));
     } else if (kind == "step") {
