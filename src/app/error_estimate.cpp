@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "coupling/step_schedule.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -37,6 +38,7 @@ CoarserRun doubled_spacing(const Case& scene) {
 
 CoarserRun longer_step(const Case& scene) {
   if (!scene.fluid) refuse("step", "this scene has no time; use --estimate-error=vertices");
+  const StepSchedule countable(scene.time);
   const long steps = std::lround(scene.time.end_us / scene.time.step_us);
   long ratio = 2;
   while (ratio <= steps && steps % ratio != 0) ++ratio;
