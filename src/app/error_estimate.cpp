@@ -2,6 +2,7 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "coupling/step_schedule.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -37,6 +38,7 @@ CoarserRun doubled_spacing(const Case& scene) {
 
 CoarserRun longer_step(const Case& scene) {
   if (!scene.fluid) refuse("step", "this scene has no time; use --estimate-error=vertices");
+  const StepSchedule countable(scene.time);
   const long steps = std::lround(scene.time.end_us / scene.time.step_us);
   long ratio = 2;
   while (ratio <= steps && steps % ratio != 0) ++ratio;
@@ -79,6 +81,7 @@ std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds
   }
   std::stringstream list(kinds);
   for (std::string kind; std::getline(list, kind, ',');) {
+    if (std::any_of(runs.begin(), runs.end(), [&](const CoarserRun& run) { return run.kind == kind; })) continue;
     if (kind == "spacing") {
       runs.push_back(doubled_spacing(scene));
     } else if (kind == "step") {

@@ -42,26 +42,26 @@ double poor_share(const std::vector<long>& fits) {
 
 }  // namespace
 
-FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
                        std::optional<double> restart_us, std::chrono::steady_clock::time_point start)
-    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us), start_(start),
-      energy_(simulation) {
+    : folder_(place.folder), run_(place.run), files_(place.files), scene_(scene), simulation_(simulation), timers_(timers),
+      restart_us_(restart_us), start_(start), energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
   columns.bodies = simulation.rigid_bodies() != nullptr;
   if (columns.cells) columns.more = shape_columns;
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
-  if (simulation.immersed()) history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
+  if (simulation.immersed()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
 #ifdef CORPUSCLE_HDF5
   if (scene.output.fields)
-    fields_ = std::make_unique<FieldWriter>(folder, comm, simulation.grid().index(),
+    fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
                                             simulation.grid().owned_nodes().data(), restart_us);
   if (scene.output.cells && simulation.surfaces()) {
     const auto& set = *simulation.surfaces();
     const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
     const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
-    cells_ = std::make_unique<CellWriter>(folder, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
+    cells_ = std::make_unique<CellWriter>(folder_, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
   }
 #endif
   if (!simulation.membranes()) return;
@@ -238,7 +238,7 @@ void FlowOutput::write_checkpoint_now() {
   const std::string path = folder_ + "/checkpoint.h5";
   std::string totals = to_text(totals_now());
   simulation_.grid().comm().broadcast(totals);
-  write_checkpoint(path, simulation_, scene_.resolved, totals);
+  write_checkpoint(path, simulation_, {scene_.resolved, files_, run_, totals});
   last_checkpoint_ = path;
 #endif
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/run_totals.hpp"
+#include "app/scene_runs.hpp"
 #include "coupling/energy_balance.hpp"
 #include "output/cell_writer.hpp"
 #include "output/field_writer.hpp"
@@ -18,7 +19,7 @@ class FlowOutput {
  public:
   /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
   /// @param start       when the program began this run
-  FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+  FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
              std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
@@ -57,7 +58,7 @@ class FlowOutput {
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
-  std::string folder_;
+  std::string folder_, run_, files_;
   Case scene_;
   FlowSimulation& simulation_;
   Timers& timers_;

@@ -49,10 +49,13 @@ CellBox face_range(const IndexSpace& index, int d) {
 CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}; }
 
 /// The stored state fits no other geometry.
-std::vector<CaseChange> allowed_changes(const std::string& path, const std::string& before, const std::string& now) {
+std::vector<CaseChange> allowed_changes(const std::string& path, const CheckpointHeader& before, const std::string& resolved,
+                                        const std::string& files) {
   std::vector<CaseChange> allowed;
   std::string refused;
-  for (const auto& change : case_changes(before, now)) {
+  auto changes = case_changes(before.resolved, resolved);
+  for (const auto& change : file_changes(before.files, files)) changes.push_back(change);
+  for (const auto& change : changes) {
     if (!change.geometry)
       allowed.push_back(change);
     else
@@ -71,12 +74,13 @@ const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i
 
 }  // namespace
 
-void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
-                      const std::string& totals) {
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const CheckpointTexts& texts) {
   const IndexSpace& index = simulation.grid().index();
   const auto progress = simulation.progress();
   CheckpointHeader header;
-  header.resolved = resolved;
+  header.resolved = texts.resolved;
+  header.files = texts.files;
+  header.run = texts.run;
   header.cells = {index.global[0], index.global[1], index.global[2]};
   header.step = progress.steps;
   header.time_us = progress.time;
@@ -116,7 +120,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const auto laps = simulation.immersed()->boundary().laps_state();
     file.add("laps", {laps.size()}, laps.data());
   }
-  file.add_text("totals", totals);
+  file.add_text("totals", texts.totals);
   file.commit();
 }
 
@@ -182,11 +186,12 @@ void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation, boo
 
 }  // namespace
 
-Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved) {
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
+                         const std::string& files) {
   const IndexSpace& index = simulation.grid().index();
   const CheckpointReader file(path, simulation.grid().comm());
   Restored restored;
-  restored.changes = allowed_changes(path, file.header().resolved, resolved);
+  restored.changes = allowed_changes(path, file.header(), resolved, files);
   file.require_grid({index.global[0], index.global[1], index.global[2]});
   double numbers[2];
   std::int64_t levels = 0;

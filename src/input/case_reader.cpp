@@ -10,6 +10,7 @@
 #include "core/error.hpp"
 #include "core/nearest.hpp"
 #include "input/case_checks.hpp"
+#include "input/case_file.hpp"
 #include "input/overrides.hpp"
 #include "input/sections.hpp"
 
@@ -19,10 +20,11 @@ namespace {
 // Hands out the sections of one case file and gathers their echo.
 class CaseReader {
  public:
-  CaseReader(const std::string& path, const std::vector<std::string>& overrides) {
-    source_.file = path;
-    source_.folder = std::filesystem::path(path).parent_path().string();
-    parse(path);
+  CaseReader(const CaseFile& file, const std::vector<std::string>& overrides) {
+    source_.file = file.path;
+    const bool piped = file.path.rfind("/dev/", 0) == 0 || file.path.rfind("/proc/", 0) == 0;  // beside the user, then
+    source_.folder = piped ? "" : std::filesystem::path(file.path).parent_path().string();
+    parse(file);
     source_.overrides = apply_overrides(root_, overrides);
     check_section_names();
   }
@@ -50,19 +52,13 @@ class CaseReader {
   }
 
  private:
-  void parse(const std::string& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
-    std::ifstream in(path, std::ios::binary);
-    const std::string text((std::istreambuf_iterator<char>(in)), {});
-    if (!in.is_open() || in.bad())
-      throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+  void parse(const CaseFile& file) {
     try {
-      root_ = toml::parse(text, path);
+      root_ = toml::parse(file.text, file.path);
     } catch (const toml::parse_error& error) {
       const auto& at = error.source().begin;
       throw InputError(
-          fmt::format("{}:{}: not valid TOML at column {}: {}", path, at.line, at.column, error.description()));
+          fmt::format("{}:{}: not valid TOML at column {}: {}", file.path, at.line, at.column, error.description()));
     }
   }
 
@@ -148,8 +144,20 @@ class CaseReader {
 
 }  // namespace
 
+CaseFile load_case_file(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
+  std::ifstream in(path, std::ios::binary);
+  CaseFile file{path, {std::istreambuf_iterator<char>(in), {}}};
+  if (!in.is_open() || in.bad())
+    throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+  return file;
+}
+
+Case read_case(const CaseFile& file, const std::vector<std::string>& overrides) { return CaseReader(file, overrides).read(); }
+
 Case read_case(const std::string& path, const std::vector<std::string>& overrides) {
-  return CaseReader(path, overrides).read();
+  return read_case(load_case_file(path), overrides);
 }
 
 }  // namespace corpuscle

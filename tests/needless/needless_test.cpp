@@ -96,7 +96,7 @@ void check_flow(const std::string& name, std::vector<std::string> overrides, dou
   recorder.start();
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
-  FlowOutput output(folder.string(), scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
+  FlowOutput output({folder.string(), [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
   output.after_step(true);
   for (int n = 0; n < 4; ++n) {
     simulation.step();
