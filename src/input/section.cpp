@@ -201,6 +201,13 @@ void Section::finish() {
   fail(key, "required key is missing; it must be " + allowed);
 }
 
+std::vector<std::string> Section::present() const {
+  std::vector<std::string> keys;
+  if (table_)
+    for (const auto& [key, value] : *table_) keys.emplace_back(key.str());
+  return keys;
+}
+
 std::string Section::echo() const {
   std::string text;
   for (const auto& [key, value] : echo_) text += key + " = " + value + "\n";

@@ -82,6 +82,11 @@ class Section {
 
   [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
   const std::string& path() const { return path_; }
+  const CaseSource& source() const { return source_; }
+  /// The keys that were asked for, whether present or not.
+  const std::vector<std::string>& known() const { return known_; }
+  /// The keys that are present.
+  std::vector<std::string> present() const;
 
  private:
   std::size_t word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback);
