@@ -91,6 +91,9 @@ TEST_CASE("a cell whose sheet rests on a spheroid is a biconcave disc at rest, o
   const CellReference r = make_reference(cell);
   for (int t : {0, 400, 995})
     for (int k = 0; k < 3; ++k) CHECK(r.rest_length[t][k] == Approx(side(spheroid, t, k)).epsilon(1e-12));
+  // Equation 13, the same everywhere: 500 vertices as in forces_test.
+  CHECK(r.rest_angle[7][1] == Approx(6.958 * pi / 180).epsilon(1e-4));
+  CHECK(r.rest_angle[7] == r.rest_angle[800]);
   CHECK(r.law.rest_area == area(biconcave));
   CHECK(r.law.rest_volume == volume(biconcave));
   CHECK(volume(r.mesh) == Approx(r.law.rest_volume).epsilon(2e-7));
