@@ -65,6 +65,10 @@ std::string toml_text(const toml::node& node) {
 Section::Section(const CaseSource& source, std::string path, const toml::table* table)
     : source_(source), path_(std::move(path)), table_(table) {}
 
+void Section::know(const std::string& key) {
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
+}
+
 const toml::node* Section::node(const std::string& key) {
   know(key);
   return table_ ? table_->get(key) : nullptr;

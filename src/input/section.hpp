@@ -94,7 +94,7 @@ class Section {
   std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count,
                                  const std::string& allowed) const;
   std::string where(const std::string& key) const;
-  void know(const std::string& key) { known_.push_back(key); }
+  void know(const std::string& key);
   void miss(const std::string& key, const std::string& allowed) { missing_.emplace_back(key, allowed); }
 
   const CaseSource& source_;

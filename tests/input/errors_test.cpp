@@ -316,6 +316,7 @@ TEST_CASE("cell types are checked") {
   require_parts(types(rbc + cell + "vertices = 300\n"), {":14: cells.0.vertices = 300", "cell's type, \"rbc\"", "set cell_types.0.vertices"});
   require_parts(types(rbc + cell + "mass_pg = 100\n"), {"cells.0.mass_pg", "set cell_types.0.mass_pg"});
   require_parts(types(rbc + cell + "spin = 300\n"), {"cells.0.spin", "unknown key; did you mean 'spin_deg'?"});
+  require_parts(types(rbc + cell + "zzzz = 1\n"), {"cells.0.zzzz", "unknown key; known here: type, center_um, axis, spin_deg"});
   require_parts(types(rbc + "[[cells]]\ntype = \"rbc\"\n"), {":11: cells.0.center_um: required key is missing"});
   require_parts(types(rbc + cell, {"cell_types.0.vertices=50"}), {"--set cell_types.0.vertices=50", "from 200 to 30000"});
   require_parts(types(rbc + cell, {"cell_types.1.vertices=500"}), {"the case has 1 [[cell_types]]"});
