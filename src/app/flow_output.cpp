@@ -126,7 +126,8 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
           "{}",
           c, 100 * drift, 100 * lysis_area,
-          settings.type < 0 ? fmt::format("cells.{}.area_modulus_uN_per_m", c) : constant_key(settings, "area_modulus_uN_per_m")));
+          settings.type < 0 ? fmt::format("cells.{}.area_modulus_uN_per_m", c)
+                            : constant_key(settings, "area_modulus_uN_per_m")));
   }
 }
 

@@ -67,7 +67,8 @@ void print_surfaces(const Case& scene) {
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const auto& cell = scene.cells[c];
     if (!cell.mesh.empty() && cells.emplace(cell.mesh, cell.scale, cell.recenter, cell.align).second)
-      print_surface(cell.type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", cell.type), cell.mesh, read_cell_surface(cell), true);
+      print_surface(cell.type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", cell.type), cell.mesh,
+                    read_cell_surface(cell), true);
   }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const auto& body = scene.bodies[b];

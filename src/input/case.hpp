@@ -106,7 +106,7 @@ struct CellSettings {
   Interior interior = Interior::empty;
   double shear_modulus_uN_per_m = 6.32; // at small strains, of any law
   double bending_modulus_fJ = 2.4e-4;   // kappa; k_b = 2 kappa / sqrt(3)
-  double area_modulus_uN_per_m = 236;   // k_a
+  double area_modulus_uN_per_m = 236;   // k_a; for sheets (neo_hookean, skalak) a case's default is 0 for both
   double local_area_modulus_uN_per_m = 4.82;  // k_d
   double volume_modulus_Pa = 248;       // k_v
   double membrane_viscosity_N_s_per_m = 0;

@@ -38,7 +38,8 @@ void read_semi_axes(Section& s, CellSettings& c) {
   const auto [low, high] = std::minmax_element(c.semi_axes_um.begin(), c.semi_axes_um.end());
   if (*high < least_extent_um / 2)
     s.fail("semi_axes_um", fmt::format("the largest must be at least {}: are these um?", least_extent_um / 2));
-  if (*high > 10 * *low) s.fail("semi_axes_um", "the largest may be ten times the smallest; give other shapes as a mesh file");
+  if (*high > 10 * *low)
+    s.fail("semi_axes_um", "the largest may be ten times the smallest; give other shapes as a mesh file");
 }
 
 void read_built_in_shape(Section& s, CellSettings& c) {
@@ -89,7 +90,8 @@ void read_rest(Section& s, CellSettings& c) {
 }
 
 void read_law(Section& s, CellSettings& c) {
-  c.law = s.choice<Law>("law", {{"wlc-pow", Law::wlc_pow}, {"neo-hookean", Law::neo_hookean}, {"skalak", Law::skalak}}, c.law);
+  c.law =
+      s.choice<Law>("law", {{"wlc-pow", Law::wlc_pow}, {"neo-hookean", Law::neo_hookean}, {"skalak", Law::skalak}}, c.law);
   if (c.law == Law::skalak)
     c.skalak_c = s.number("skalak_c", not_negative(1e6), c.skalak_c);
   else
@@ -106,18 +108,15 @@ void read_membrane(Section& s, CellSettings& c) {
   // bits.
   c.bending_modulus_fJ = s.number("bending_modulus_J", not_negative(), 2.4e-19) * units::J;
   c.area_modulus_uN_per_m = s.number("area_modulus_uN_per_m", not_negative(), c.area_modulus_uN_per_m);
-  c.local_area_modulus_uN_per_m =
-      s.number("local_area_modulus_uN_per_m", not_negative(), c.local_area_modulus_uN_per_m);
+  c.local_area_modulus_uN_per_m = s.number("local_area_modulus_uN_per_m", not_negative(), c.local_area_modulus_uN_per_m);
   if (c.law == Law::wlc_pow && c.local_area_modulus_uN_per_m == 0)
-    s.fail(
-        "local_area_modulus_uN_per_m",
-        "must be above 0: with springs and the total area alone triangles can collapse or fold at no cost, the problem "
-        "is ill-posed and solutions get stuck");
+    s.fail("local_area_modulus_uN_per_m",
+           "must be above 0: with springs and the total area alone triangles can collapse or fold at no cost, the problem "
+           "is ill-posed and solutions get stuck");
   c.volume_modulus_Pa = s.number("volume_modulus_Pa", not_negative(), c.volume_modulus_Pa);
-  c.membrane_viscosity_N_s_per_m =
-      s.number("membrane_viscosity_N_s_per_m", not_negative(), c.membrane_viscosity_N_s_per_m);
-  c.dissipation = s.choice<Dissipation>("dissipation", {{"central", Dissipation::central}, {"full", Dissipation::full}},
-                                        c.dissipation);
+  c.membrane_viscosity_N_s_per_m = s.number("membrane_viscosity_N_s_per_m", not_negative(), c.membrane_viscosity_N_s_per_m);
+  c.dissipation =
+      s.choice<Dissipation>("dissipation", {{"central", Dissipation::central}, {"full", Dissipation::full}}, c.dissipation);
 }
 
 /// What the cells of a type have in common.
@@ -157,7 +156,8 @@ CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
   for (const auto& type : types) names.push_back(type.name);
   const auto at = std::find(names.begin(), names.end(), name);
   if (types.empty())
-    s.fail("type", "the case has no [[cell_types]]: add one with this name, or leave out type and give the cell's keys here");
+    s.fail("type",
+           "the case has no [[cell_types]]: add one with this name, or leave out type and give the cell's keys here");
   if (at == names.end()) {
     const auto like = nearest(name, names);
     s.fail("type", fmt::format("unknown cell type; known: \"{}\"{}", fmt::join(names, "\", \""),
@@ -167,9 +167,10 @@ CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
   const auto constants = known_constants(s);
   for (const auto& key : s.present())
     if (std::find(constants.begin(), constants.end(), key) != constants.end())
-      s.fail(key, fmt::format("this belongs to the cell's type, \"{}\": set {} (for all its cells), give this cell a type of its "
-                              "own, or leave out type and give all its keys here",
-                              name, constant_key(cell, key)));
+      s.fail(key,
+             fmt::format("this belongs to the cell's type, \"{}\": set {} (for all its cells), give this cell a type of its "
+                         "own, or leave out type and give all its keys here",
+                         name, constant_key(cell, key)));
   return cell;
 }
 

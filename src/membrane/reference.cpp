@@ -37,7 +37,8 @@ CellLaw make_law(const CellSettings& c) {
           "must not be negative; measured values are about 0.5e-6");
   require(c, c.local_area_modulus_uN_per_m >= 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m,
           "must not be negative");
-  require(c, c.law != CellSettings::Law::wlc_pow || c.local_area_modulus_uN_per_m > 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m,
+  require(c, c.law != CellSettings::Law::wlc_pow || c.local_area_modulus_uN_per_m > 0, "local_area_modulus_uN_per_m",
+          c.local_area_modulus_uN_per_m,
           "must be positive with springs: without it triangles can collapse and the solution gets stuck; the model's value is "
           "4.82");
   CellLaw law;
@@ -112,10 +113,10 @@ double smallest_vertex_area(const TriangleMesh& mesh) {
 }
 
 auto type_key(const CellSettings& c) {
-  return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align, c.mass_pg,
-                  c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation, c.shear_modulus_uN_per_m, c.bending_modulus_fJ,
-                  c.area_modulus_uN_per_m, c.local_area_modulus_uN_per_m, c.volume_modulus_Pa,
-                  c.membrane_viscosity_N_s_per_m, c.dissipation);
+  return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align,
+                  c.mass_pg, c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation,
+                  c.shear_modulus_uN_per_m, c.bending_modulus_fJ, c.area_modulus_uN_per_m,
+                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.dissipation);
 }
 
 }  // namespace

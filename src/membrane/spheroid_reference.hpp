@@ -5,7 +5,8 @@
 
 namespace corpuscle {
 
-/// Semi-axes (a, a, b), a >= b, of the oblate spheroid of that area (um2) and reduced volume 6 sqrt(pi) V / A^(3/2), 0.65 to 1.
+/// Semi-axes (a, a, b), a >= b, of the oblate spheroid of that area (um2) and reduced volume 6 sqrt(pi) V / A^(3/2), 0.65
+/// to 1.
 Triple oblate_semi_axes(double area, double reduced_volume);
 
 /// The biconcave mesh of the given diameter on the oblate spheroid: latitude by latitude, so that equal shares of area go to

@@ -49,7 +49,11 @@ std::array<double, 3> tension(const CellSettings& settings, const Deformation& d
     for (Vec3& n : state.other_normal) n = {0, 0, 1};
     state.area = 0.5 * cross(state.corner[1], state.corner[2]).z;
     Vec3 force[3];
-    std::visit([&](const auto& in_plane) { triangle_forces(state, rest, law, in_plane, {0, 0}, force); }, reference.in_plane);
+    std::visit(
+        [&](const auto& in_plane) {
+          triangle_forces(state, rest, law, in_plane, {0, 0}, force);
+        },
+        reference.in_plane);
     for (int k = 0; k < 3; ++k) {
       sum[0] -= force[k].x * state.corner[k].x;
       sum[1] -= force[k].x * state.corner[k].y;
@@ -95,7 +99,8 @@ TEST_CASE("the modulus of area is G (1 + 2 C) of a Skalak sheet and 3 G of a neo
     CHECK(t[0] == Approx(t[2]).epsilon(1e-9));
     return t[0] / (2 * strain);
   };
-  for (double c : {0.0, 1.0, 10.0, 1000.0}) CHECK(modulus(with_law(Law::skalak, c)) == Approx(G * (1 + 2 * c)).epsilon(1e-4));
+  for (double c : {0.0, 1.0, 10.0, 1000.0})
+    CHECK(modulus(with_law(Law::skalak, c)) == Approx(G * (1 + 2 * c)).epsilon(1e-4));
   CHECK(modulus(with_law(Law::neo_hookean)) == Approx(3 * G).epsilon(1e-4));
 }
 
@@ -171,7 +176,8 @@ TEST_CASE("an overstretched sheet is refused in the words of its law") {
   auto x = to_host(m.surfaces().x, m.vertices());
   for (int i = 200; i < 400; ++i) x[i].x *= 11;
   to_device(x, m.surfaces().x);
-  CHECK_THROWS_WITH(m.compute_forces(), Catch::Matchers::Contains("cell 1") && Catch::Matchers::Contains("a triangle stretched 11 times") &&
+  CHECK_THROWS_WITH(m.compute_forces(), Catch::Matchers::Contains("cell 1") &&
+                                            Catch::Matchers::Contains("a triangle stretched 11 times") &&
                                             Catch::Matchers::Contains("holds to 10"));
 }
 

@@ -1,10 +1,9 @@
 // Cells whose sheet rests on a spheroid, relaxed to the biconcave shape.
-#include "membrane/spheroid_reference.hpp"
-
 #include <catch2/catch.hpp>
 
 #include "core/error.hpp"
 #include "membrane/mesh_generator.hpp"
+#include "membrane/spheroid_reference.hpp"
 #include "membrane/surface_shape.hpp"
 #include "membrane_fixture.hpp"
 
@@ -55,7 +54,7 @@ TEST_CASE("the biconcave mesh goes to the spheroid by equal shares of area") {
     const double r = std::hypot(p[0], p[1]);
     const double level = std::sqrt(r * r / (axes[0] * axes[0]) + p[2] * p[2] / (axes[2] * axes[2]));
     if (i == 0) scale = level;
-    REQUIRE(level == Approx(scale).epsilon(1e-9));  // all on one spheroid
+    REQUIRE(level == Approx(scale).epsilon(1e-9));             // all on one spheroid
     REQUIRE(p[0] * q[1] == Approx(p[1] * q[0]).margin(1e-9));  // the same longitude
   }
   CHECK(scale == Approx(1).epsilon(0.01));  // triangles inside a sphere and inside the cell lack the same area but for 0.3 %
@@ -101,8 +100,8 @@ TEST_CASE("a cell whose sheet rests on a spheroid is a biconcave disc at rest, o
   REQUIRE(r.relaxed);
   CHECK(r.relaxed->biconcave());
   report("v {}, law {}: {} iterations, {:.2f} um, {:.2f} at the centre, {:.2f} at most, dimples {:.2f} {:.2f}", v, int(law),
-         r.relaxed->iterations, r.relaxed->diameter, r.relaxed->thickness_center, r.relaxed->thickness_max, r.relaxed->dimple[0],
-         r.relaxed->dimple[1]);
+         r.relaxed->iterations, r.relaxed->diameter, r.relaxed->thickness_center, r.relaxed->thickness_max,
+         r.relaxed->dimple[0], r.relaxed->dimple[1]);
   // Measured cells (Evans & Fung 1972): 7.82 +- 0.62 um wide, 0.81 +- 0.35 and 2.58 +- 0.27 um thick.
   CHECK(r.relaxed->diameter == Approx(7.82).margin(0.62));
   CHECK(r.relaxed->thickness_center == Approx(0.81).margin(0.35));
