@@ -113,6 +113,9 @@ void FlowOutput::after_step(bool start) {
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
+    const CellSettings& settings = scene_.cells[c];
+    // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
+    if (settings.law != CellSettings::Law::wlc_pow && settings.area_modulus_uN_per_m == 0) continue;
     const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
     totals_.area_drift = larger(totals_.area_drift, drift);
     if (!(drift <= senseless_area))
@@ -121,8 +124,10 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
           "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
           "tell (grid.nodes); reduce the flow "
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
-          "cells.{}.area_modulus_uN_per_m",
-          c, 100 * drift, 100 * lysis_area, c));
+          "{}",
+          c, 100 * drift, 100 * lysis_area,
+          settings.type < 0 ? fmt::format("cells.{}.area_modulus_uN_per_m", c)
+                            : constant_key(settings, "area_modulus_uN_per_m")));
   }
 }
 

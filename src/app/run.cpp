@@ -33,6 +33,7 @@ void print_start(const Comm& comm, const Case& scene) {
        comm.size() == 1 ? "" : "s", thread_count(), thread_count() == 1 ? "" : "s");
   print_modules(list_modules(scene, comm.size()));
   for (const auto& line : outputs_left_out(scene.output)) warn("{}", line);
+  print_cell_types(scene);
   print_surfaces(scene);
 }
 

@@ -1,85 +1,10 @@
-// [[cells]], [[bodies]], [coupling], [stretching] and [output].
+// [[bodies]], [coupling], [stretching] and [output].
 #include <fmt/format.h>
-
-#include <cmath>
-#include <filesystem>
 
 #include "core/units.hpp"
 #include "input/sections.hpp"
 
 namespace corpuscle {
-namespace {
-
-void check_surface_file(Section& s, const std::string& key, const std::string& path) {
-  const auto extension = std::filesystem::path(path).extension();
-  if (!path.empty() && extension != ".off" && extension != ".stl" && extension != ".OFF" && extension != ".STL")
-    s.fail(key, "must be an OFF or STL file (.off, .stl)");
-}
-
-Triple read_axis(Section& s) {
-  const auto axis = s.triple("axis", any_number(), Triple{0, 0, 1});
-  if (std::hypot(axis[0], axis[1], axis[2]) < 1e-12) s.fail("axis", "must not be zero: it is a direction");
-  return axis;
-}
-
-void read_membrane(Section& s, CellSettings& c) {
-  using Dissipation = CellSettings::Dissipation;
-  c.shear_modulus_uN_per_m = s.number("shear_modulus_uN_per_m", positive(), c.shear_modulus_uN_per_m);
-  // The default passes through the same conversion as a value from a file, so that the echo reads back to the same
-  // bits.
-  c.bending_modulus_fJ = s.number("bending_modulus_J", not_negative(), 2.4e-19) * units::J;
-  c.area_modulus_uN_per_m = s.number("area_modulus_uN_per_m", not_negative(), c.area_modulus_uN_per_m);
-  c.local_area_modulus_uN_per_m =
-      s.number("local_area_modulus_uN_per_m", not_negative(), c.local_area_modulus_uN_per_m);
-  if (c.local_area_modulus_uN_per_m == 0)
-    s.fail(
-        "local_area_modulus_uN_per_m",
-        "must be above 0: with springs and the total area alone triangles can collapse or fold at no cost, the problem "
-        "is ill-posed and solutions get stuck");
-  c.volume_modulus_Pa = s.number("volume_modulus_Pa", not_negative(), c.volume_modulus_Pa);
-  c.membrane_viscosity_N_s_per_m =
-      s.number("membrane_viscosity_N_s_per_m", not_negative(), c.membrane_viscosity_N_s_per_m);
-  c.dissipation = s.choice<Dissipation>("dissipation", {{"central", Dissipation::central}, {"full", Dissipation::full}},
-                                        c.dissipation);
-}
-
-}  // namespace
-
-CellSettings read_cell(Section& s, bool placed) {
-  using Reference = CellSettings::Reference;
-  using Interior = CellSettings::Interior;
-  CellSettings c;
-  c.mesh = s.file("mesh", false);
-  check_surface_file(s, "mesh", c.mesh);
-  if (c.mesh.empty()) {
-    c.vertices = s.integer("vertices", 200, 30000, c.vertices);
-  } else {
-    s.unused("vertices", "the mesh file decides how many vertices the cell has: leave out vertices or mesh");
-    c.vertices = 0;
-  }
-  for (const char* key : {"scale", "recenter", "align"})
-    if (c.mesh.empty()) s.unused(key, "only a cell with a mesh file has this key");
-  if (!c.mesh.empty()) {
-    c.scale = s.number("scale", positive(), c.scale);
-    c.recenter = s.flag("recenter", c.recenter);
-    c.align = s.flag("align", c.align);
-  }
-  c.center_um = placed ? s.triple("center_um", any_number()) : s.triple("center_um", any_number(), Triple{});
-  c.axis = read_axis(s);
-  c.spin_deg = s.number("spin_deg", between(-360, 360), c.spin_deg);
-  c.mass_pg = s.number("mass_pg", positive(), c.mass_pg);
-  c.reference = s.choice<Reference>("reference",
-                                    {{"shape", Reference::shape},
-                                     {"spontaneous-angle", Reference::spontaneous_angle},
-                                     {"uniform", Reference::uniform}},
-                                    c.reference);
-  c.interior = s.choice<Interior>("interior", {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
-  if (c.interior == Interior::cytosol)
-    s.fail("interior", "a fluid inside the cell does not exist yet; use \"empty\" (the volume is held exactly)");
-  read_membrane(s, c);
-  s.finish();
-  return c;
-}
 
 BodySettings read_body(Section& s) {
   using Shape = BodySettings::Shape;

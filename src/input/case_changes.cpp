@@ -50,8 +50,9 @@ bool is_geometry(const std::string& key) {
   if (starts_with(key, "number of") || starts_with(key, "grid.")) return true;
   if (starts_with(key, "bodies.")) return true;  // moved as prescribed from the start: another velocity is another place
   if (starts_with(key, "boundary.")) return ends_with(key, ".side") || ends_with(key, ".type");
-  if (!starts_with(key, "cells.")) return false;
-  for (const char* name : {".vertices", ".mesh", ".interior", ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg"})
+  if (!starts_with(key, "cells.") && !starts_with(key, "cell_types.")) return false;
+  for (const char* name : {".type", ".vertices", ".shape", ".diameter_um", ".radius_um", ".semi_axes_um", ".mesh", ".interior",
+                           ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg"})
     if (ends_with(key, name)) return true;
   return false;
 }
@@ -77,7 +78,10 @@ std::vector<CaseChange> case_changes(const std::string& before, const std::strin
   };
   for (const auto& [key, value] : new_values) {
     const auto old = find(old_values, key);
-    note(key, old == old_values.end() ? absent : old->second, value);
+    if (old != old_values.end())
+      note(key, old->second, value);
+    else
+      note(key, absent, value);
   }
   for (const auto& [key, value] : old_values)
     if (find(new_values, key) == new_values.end()) note(key, value, absent);

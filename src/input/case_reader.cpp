@@ -38,7 +38,8 @@ class CaseReader {
     if (root_.contains("fluid")) scene.fluid = one<FluidSettings>("fluid", read_fluid);
     each("boundary", [&](Section& s) { scene.boundaries.push_back(read_boundary(s)); });
     const bool placed = scene.fluid.has_value();
-    each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, placed)); });
+    each("cell_types", [&](Section& s) { scene.cell_types.push_back(read_cell_type(s, scene.cell_types)); });
+    each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, scene.cell_types, placed)); });
     each("bodies", [&](Section& s) { scene.bodies.push_back(read_body(s)); });
     const bool coupled = scene.fluid && !scene.cells.empty();
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);

@@ -65,6 +65,10 @@ std::string toml_text(const toml::node& node) {
 Section::Section(const CaseSource& source, std::string path, const toml::table* table)
     : source_(source), path_(std::move(path)), table_(table) {}
 
+void Section::know(const std::string& key) {
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
+}
+
 const toml::node* Section::node(const std::string& key) {
   know(key);
   return table_ ? table_->get(key) : nullptr;
@@ -199,6 +203,13 @@ void Section::finish() {
   if (missing_.empty()) return;
   const auto& [key, allowed] = missing_.front();
   fail(key, "required key is missing; it must be " + allowed);
+}
+
+std::vector<std::string> Section::present() const {
+  std::vector<std::string> keys;
+  if (table_)
+    for (const auto& [key, value] : *table_) keys.emplace_back(key.str());
+  return keys;
 }
 
 std::string Section::echo() const {

@@ -82,6 +82,11 @@ class Section {
 
   [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
   const std::string& path() const { return path_; }
+  const CaseSource& source() const { return source_; }
+  /// The keys that were asked for, whether present or not.
+  const std::vector<std::string>& known() const { return known_; }
+  /// The keys that are present.
+  std::vector<std::string> present() const;
 
  private:
   std::size_t word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback);
@@ -89,7 +94,7 @@ class Section {
   std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count,
                                  const std::string& allowed) const;
   std::string where(const std::string& key) const;
-  void know(const std::string& key) { known_.push_back(key); }
+  void know(const std::string& key);
   void miss(const std::string& key, const std::string& allowed) { missing_.emplace_back(key, allowed); }
 
   const CaseSource& source_;

@@ -40,6 +40,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
     }
     type_of_cell.push_back(type);
     bodies.push_back(placed_mesh(types[type], cell));
+    law_.push_back(types[type].in_plane);
     vertex_mass_.push_back(types[type].law.vertex_mass);
     vertex_area_.push_back(types[type].smallest_vertex_area);
     rest_area_.push_back(types[type].law.rest_area);
@@ -50,7 +51,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
   views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
   views_.surface.cells = views_.cells;
-  elasticity_ = make_elasticity(types);
+  elasticity_ = make_elasticity(types, type_of_cell);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   status_host_ = HostCopy(views_.status);
@@ -176,6 +177,7 @@ void Membranes::explain(int cell, double dt) {
   const bool finite = std::isfinite(now.area_um2) && std::isfinite(now.volume_um3) && std::isfinite(now.stretch);
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   const CellDiagnostics before = diagnostics()[cell];
+  const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
   const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", cell, before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
   const std::string step =
@@ -183,16 +185,14 @@ void Membranes::explain(int cell, double dt) {
              : std::string();
   if (finite) {
     throw ComputationError(fmt::format(
-        "membrane overstretched: {}: a link reached {:.3f} of its contour length{} ({:.3f} before). The load "
-        "is too large or the coupling unstable: reduce time.step_us or the load, or raise "
-        "cells.shear_modulus_uN_per_m or coupling.robin_coefficient_pg_per_um2_per_us",
-        where, now.stretch, step, before.stretch));
+        "membrane overstretched: {}: {}{} ({} before). The load is too large or the coupling unstable: reduce time.step_us or the "
+        "load, or raise its shear_modulus_uN_per_m or coupling.robin_coefficient_pg_per_um2_per_us",
+        where, reached, step, was));
   }
   throw ComputationError(fmt::format(
-      "membrane position is not finite: {}{} (largest stretch before: {:.3f} of the contour length). The traction on "
-      "it "
-      "is not finite or the step too long: reduce time.step_us, or raise cells.mass_pg or coupling.robin_coefficient_pg_per_um2_per_us",
-      where, step, before.stretch));
+      "membrane position is not finite: {}{} ({} before). The traction on it is not finite or the step too long: reduce "
+      "time.step_us, or raise its mass_pg or coupling.robin_coefficient_pg_per_um2_per_us",
+      where, step, was));
 }
 
 void Membranes::save_state() {

@@ -111,6 +111,7 @@ TEST_CASE("a restart refuses another geometry, and says which other keys have ch
   };
   warn("fluid.kinematic_viscosity_um2_per_us=1.2", "fluid.kinematic_viscosity_um2_per_us", "1.2", "1.1");
   warn("cells.0.shear_modulus_uN_per_m=7", "cells.0.shear_modulus_uN_per_m", "7", "6.32");
+  warn("cells.0.law=skalak", "cells.0.law", "\"skalak\"", "\"wlc-pow\"");
   warn("boundary.0.velocity_mm_per_s=2.5", "boundary.0.velocity_mm_per_s", "2.5", "2");
   const auto silent = succeed(folder, restarted(coarse_tube("silent", {"time.end_us=3", "output.every_us=1"}), "good/checkpoint.h5"));
   CHECK_THAT(silent.output, !Contains("until the checkpoint"));
