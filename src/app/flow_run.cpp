@@ -77,7 +77,8 @@ std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoin
     throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint,
                                  simulation.time()));
   if (simulation.at_outflow())
-    throw InputError(fmt::format("{}: {}; to go on, lower time.stop_before_outflow_um, which is {:g} (the least is the way of two steps)",
+    throw InputError(fmt::format("{}: {}; to go on, lower time.stop_before_outflow_um, which is {:g} (the least is the way of "
+                                 "two steps)",
                                  checkpoint, simulation.outflow_message(), scene.time.stop_before_outflow_um));
   tell_missing(scene, checkpoint, place.folder, simulation);
   return totals;

@@ -17,13 +17,13 @@ constexpr double most_ticks = 1e15;  // times are whole numbers of ticks, which 
 /// Whether steps can be counted, before they are.
 void check_counts(const TimeSettings& settings) {
   if (settings.first_step_us > 0 && settings.step_us > settings.first_step_us * std::ldexp(1 + 1e-9, most_doublings))
-    throw InputError(fmt::format("time.first_step_us = {} is too short for steps of {} us (time.step_us): the least is a {}th of them, "
-                                 "{:.3g} us", settings.first_step_us, settings.step_us, 1 << most_doublings,
+    throw InputError(fmt::format("time.first_step_us = {} is too short for steps of {} us (time.step_us): the least is a {}th "
+                                 "of them, {:.3g} us", settings.first_step_us, settings.step_us, 1 << most_doublings,
                                  std::ldexp(settings.step_us, -most_doublings)));
   const double shortest = settings.first_step_us > 0 ? std::min(settings.step_us, settings.first_step_us) : settings.step_us;
   if (!(settings.end_us / shortest <= most_ticks))
-    throw InputError(fmt::format("time.end_us = {} is {:.3g} steps of {} us, and at most {:g} can be told apart: raise time.{}, or lower "
-                                 "time.end_us", settings.end_us, settings.end_us / shortest, shortest, most_ticks,
+    throw InputError(fmt::format("time.end_us = {} is {:.3g} steps of {} us, and at most {:g} can be told apart: raise time.{}, "
+                                 "or lower time.end_us", settings.end_us, settings.end_us / shortest, shortest, most_ticks,
                                  shortest < settings.step_us ? "first_step_us" : "step_us"));
 }
 

@@ -100,8 +100,8 @@ void require_checkpoint(const Hdf5File& file) {
   if (!file.has_attribute("/", "complete"))
     throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
   if (!file.has_attribute("/", "seal") || file.text("/", "seal") != seal_of(file))
-    throw InputError(fmt::format("{}: its header (time, step, case and the like) is damaged: it is not what was written; use another "
-                                 "checkpoint", path));
+    throw InputError(fmt::format("{}: its header (time, step, case and the like) is damaged: it is not what was written; use "
+                                 "another checkpoint", path));
 }
 
 }  // namespace

@@ -46,7 +46,9 @@ struct RunLabel {
   explicit RunLabel(const fs::path& folder) { std::ifstream(folder / run_name) >> run >> from >> step; }
 };
 
-std::string label_text(const std::string& run, const Continued& from) { return fmt::format("{}\n{} {}\n", run, from.run, from.step); }
+std::string label_text(const std::string& run, const Continued& from) {
+  return fmt::format("{}\n{} {}\n", run, from.run, from.step);
+}
 
 std::string this_host() {
   char name[256] = "";
@@ -135,14 +137,14 @@ void RunFolder::settle_run(const Continued& continued) {
   const auto result = first_result(path_);
   const bool here = fs::equivalent(path_, fs::absolute(continued.checkpoint, ignored).parent_path(), ignored);
   if (earlier_ == EarlierResults::overwrite && here)
-    throw InputError(fmt::format("--overwrite would remove {} before the run goes on from it: leave out --overwrite, or choose another "
-                                 "folder with --out", continued.checkpoint));
+    throw InputError(fmt::format("--overwrite would remove {} before the run goes on from it: leave out --overwrite, or choose "
+                                 "another folder with --out", continued.checkpoint));
   if (result.empty() || earlier_ == EarlierResults::overwrite) return;
   const RunLabel label(path_);
   const bool began_here = label.from == continued.run && label.step == continued.step;
   if (label.run.empty() ? !here : label.run != continued.run && !began_here)
-    throw InputError(fmt::format("--out {}: holds the results of another run ({}) than {} is of: choose another folder, go on from its "
-                                 "own {}/checkpoint.h5, or write over them with --overwrite",
+    throw InputError(fmt::format("--out {}: holds the results of another run ({}) than {} is of: choose another folder, go on "
+                                 "from its own {}/checkpoint.h5, or write over them with --overwrite",
                                  path_, result, continued.checkpoint, path_));
   run_ = label.run.empty() ? continued.run : label.run;
   label_ = label.run.empty() ? label_text(run_, continued) : "";
