@@ -42,6 +42,8 @@ class FlowOutput {
 
  private:
   bool due(double every_us) const;
+  bool sampled() const;
+  void sample_flow();
   void gather();
   void write_history();
   void measure();

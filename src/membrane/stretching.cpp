@@ -67,7 +67,7 @@ class Stretcher {
     }
     Kokkos::deep_copy(membranes_.surfaces().v, 0.0);
     step.cell = membranes_.diagnostics()[0];
-    if (!(step.cell.stretch < membranes_.elasticity().limit())) fail(step);
+    if (!(step.cell.stretch < membranes_.elasticity().limit())) overstretched(step);
     const Triple extent = step.cell.extent_um();
     step.axial_um = extent[0];
     step.transverse_um = extent[1];
@@ -86,6 +86,14 @@ class Stretcher {
     // Half the stable step at the present shape: links stiffen while the cell moves. A tenth of an edge a move keeps
     // triangles from folding.
     return {0.2 / std::sqrt(undamped), 1 / std::sqrt(undamped), 0.1 * edge_};
+  }
+
+  [[noreturn]] void overstretched(const StretchingStep& step) {
+    throw ComputationError(fmt::format(
+        "stretching: at {:.4g} pN a link of the membrane is stretched to {:.3f} of its contour length, which no link can pass: the force "
+        "is beyond what the model holds; lower stretching.force_pN, raise cells.0.shear_modulus_uN_per_m, or spread the force "
+        "(stretching.patch_fraction)",
+        step.force_pN, step.cell.stretch));
   }
 
   [[noreturn]] void fail(const StretchingStep& step) {
