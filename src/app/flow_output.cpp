@@ -79,20 +79,20 @@ bool FlowOutput::due(double every_us) const {
   return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
 }
 
-/// Whether the figures that cost a share of a step are taken after this one: whatever the run stores, at the first steps,
-/// where most flows change fastest, at every eighth, and at the last.
-bool FlowOutput::sampled() const {
+/// Figures that cost a share of a step are taken, whatever the run stores, at the first steps, where most flows change fastest,
+/// at every eighth, and at the last: that one counts for this run's report alone, since a run that goes on from here would not
+/// have it.
+void FlowOutput::sample_flow() {
   constexpr long first = 8, every = 8;
   const long step = simulation_.steps();
-  return step <= first || step % every == 0 || simulation_.done() || simulation_.at_outflow();
-}
-
-void FlowOutput::sample_flow() {
-  const double splitting = simulation_.fluid().splitting();
-  totals_.splitting_us += splitting * (simulation_.time() - totals_.splitting_until_us);
-  totals_.splitting_until_us = simulation_.time();
-  totals_.splitting_max = larger(totals_.splitting_max, splitting);
-  if (simulation_.surfaces()) totals_.slip_speed = larger(totals_.slip_speed, simulation_.immersed()->slip()[1]);
+  const bool regular = step <= first || step % every == 0;
+  if (!regular && !simulation_.done() && !simulation_.at_outflow()) return;
+  const FlowSample sample{simulation_.time(), simulation_.fluid().splitting(),
+                          simulation_.surfaces() ? simulation_.immersed()->slip()[1] : 0.0};
+  if (regular)
+    totals_.add(sample);
+  else
+    end_sample_ = sample;
 }
 
 void FlowOutput::gather() {
@@ -118,7 +118,7 @@ void FlowOutput::after_step(bool start) {
     if (history_) write_history();
     energy_.sample(elastic_energy_);
   }
-  if (!start && sampled()) sample_flow();
+  if (!start) sample_flow();
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -320,7 +320,8 @@ void FlowOutput::fill_quantities(Report& report) const {
   if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
 }
 
-void FlowOutput::fill_totals(Report& report, const RunTotals& now) const {
+void FlowOutput::fill_totals(Report& report, RunTotals now) const {
+  if (end_sample_) now.add(*end_sample_);
   auto& errors = report.errors;
   errors["max_divergence"] = now.divergence;
   errors["flux_correction"] = now.flux_correction;

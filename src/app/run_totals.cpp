@@ -1,5 +1,6 @@
 #include "app/run_totals.hpp"
 
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 
 #include <fmt/format.h>
@@ -28,6 +29,13 @@ void read_nulls(nlohmann::json& value) {
 }
 
 }  // namespace
+
+void RunTotals::add(const FlowSample& sample) {
+  splitting_us += sample.splitting * (sample.time_us - splitting_until_us);
+  splitting_until_us = sample.time_us;
+  splitting_max = larger(splitting_max, sample.splitting);
+  slip_speed = larger(slip_speed, sample.slip_speed);
+}
 
 std::string to_text(const RunTotals& totals) { return nlohmann::json(totals).dump(); }
 

@@ -9,6 +9,11 @@
 
 namespace corpuscle {
 
+/// Figures of one step that are not taken after each.
+struct FlowSample {
+  double time_us = 0, splitting = 0, slip_speed = 0;  // slip in um/us
+};
+
 struct RunTotals {
   Tally momentum, pressure, projections, coupling, substeps, residual;
   double divergence = 0, flux_correction = 0, volume_drift = 0, area_drift = 0;
@@ -18,6 +23,9 @@ struct RunTotals {
   EnergyBalance::State energy;
   double wall_s = 0;                             // of the runs before this one, and of each part
   std::map<std::string, double> wall_s_by_part;
+
+  /// A sample stands for the time since the one before it.
+  void add(const FlowSample& sample);
 };
 
 /// As text for a checkpoint: every number with all its digits.
