@@ -100,6 +100,7 @@ void FlowOutput::gather() {
   totals_.momentum.add(fluid.momentum_iterations);
   totals_.pressure.add(fluid.pressure_iterations);
   totals_.projections.add(fluid.projections);
+  totals_.speed = larger(totals_.speed, fluid.speed);
   const double spacing = simulation_.grid().mean_spacing();
   if (fluid.reference_speed > 0)
     totals_.divergence = larger(totals_.divergence, fluid.divergence / (fluid.reference_speed * spacing * spacing));
@@ -328,7 +329,8 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   errors["splitting"] = now.splitting_until_us > 0 ? now.splitting_us / now.splitting_until_us : 0.0;
   errors["splitting_max"] = now.splitting_max;
   if (simulation_.surfaces()) {
-    errors["slip"] = now.slip_speed / std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
+    // Of the flow's own speed, prescribed or computed: the solvers' reference may be that of a membrane's return to its shape.
+    errors["slip"] = now.slip_speed / std::max({simulation_.fluid().boundaries().largest_speed(), now.speed, 1e-30});
     const auto& search = now.immersed;
     report.extra["immersed"] = {{"classifications", search.classifications},
                                 {"immersed_nodes", search.immersed},

@@ -16,7 +16,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyTotals, boundaries, gradient, dissipati
                                    membrane_dissipation, membrane_kinetic)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, driving_pressure, time, samples)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
-                                   volume_drift, area_drift, slip_speed, splitting_us,
+                                   volume_drift, area_drift, speed, slip_speed, splitting_us,
                                    splitting_until_us, splitting_max, immersed, energy, wall_s, wall_s_by_part)
 
 namespace {

@@ -18,6 +18,7 @@ struct RunTotals {
   Tally momentum, pressure, projections, coupling, substeps, residual;
   double divergence = 0, flux_correction = 0, volume_drift = 0, area_drift = 0;
   double splitting_us = 0, splitting_until_us = 0, splitting_max = 0;  // integral over time until then, from the sampled steps
+  double speed = 0;                                                    // um/us, the largest at a node so far
   double slip_speed = 0;                                               // um/us, the largest of the sampled steps
   ImmersedReport immersed;
   EnergyBalance::State energy;

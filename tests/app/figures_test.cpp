@@ -106,6 +106,7 @@ TEST_CASE("a stretching test is judged by what it is") {
   CHECK(weak["warnings"].size() == 1);
   const auto one = run({"stretching.steps=1", "stretching.force_pN=100"});
   CHECK(has(one["errors"], "experiment_axial_rms_um"));
+  REQUIRE(one["warnings"].size() == 1);
   CHECK(one["warnings"][0]["key"] == "stretching.steps");
 }
 
@@ -122,9 +123,10 @@ TEST_CASE("a Robin coefficient far above its default is said") {
 
 TEST_CASE("a cell is at the outflow when it is, whatever the speed that shear modulus over viscosity is") {
   const auto folder = fresh_folder("outflow");
-  const auto outcome = start(folder, coarse_tube("out", {"time.end_us=1", "fluid.kinematic_viscosity_um2_per_us=1e-9"}));
+  const auto outcome = start(folder, coarse_tube("out", {"time.end_us=3", "fluid.kinematic_viscosity_um2_per_us=1e-9"}));
   INFO(outcome.output);
-  CHECK(outcome.code != 5);
+  CHECK(outcome.code == 0);
+  CHECK(report(folder / "out")["errors"]["slip"] > 1e-3);  // a share of the flow's speed, not of that one
   fail(folder, coarse_tube("out", {"time.end_us=40", "time.stop_before_outflow_um=21.2"}), 5, {"the limit is", "time.stop_before_outflow_um"});
 }
 

@@ -253,11 +253,12 @@ TEST_CASE("cells and bodies are checked") {
   for (const char* key : {"tolerance = 1e-4", "max_iterations = 5", "acceleration = \"aitken\"", "robin_in_iterated = false"})
     require_parts(cell("[coupling]\n" + std::string(key)),
                   {":13: coupling." + std::string(key).substr(0, std::string(key).find(' ')), "only scheme = \"iterated\""});
-  for (const char* key : {"shear_modulus_uN_per_m = 1e300", "volume_modulus_Pa = 1e300", "center_um = [1e300, 0, 0]",
-                          "axis = [1e200, 0, 1e200]", "mass_pg = 1e300"}) {
+  for (const char* key : {"shear_modulus_uN_per_m = 1e300", "volume_modulus_Pa = 1e300", "axis = [1e200, 0, 1e200]", "mass_pg = 1e300"}) {
     const std::string name(key, std::string(key).find(' '));
     require_parts(cell(key), {":12: cells.0." + name, "must be", "a number"});
   }
+  require_parts(message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [1e300, 0, 0]\n")),
+                {":11: cells.0.center_um = [1e+300, 0, 0]", "each a number from -1"});
   require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
 
   const auto body = [](const std::string& text) {
