@@ -43,12 +43,13 @@ class FlowOutput {
 
  private:
   bool due(double every_us) const;
+  void sample_flow();
   void gather();
   void write_history();
   void measure();
   void measure_bodies();
   void write_checkpoint_now();
-  void fill_totals(Report& report, const RunTotals& now) const;
+  void fill_totals(Report& report, RunTotals now) const;
   void write_fields();
   void write_cells();
   RunTotals totals_now(bool together = true);
@@ -71,6 +72,7 @@ class FlowOutput {
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
   RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
+  std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
   std::chrono::steady_clock::time_point start_;
   EnergyBalance energy_;
   std::vector<HistorySample> last_;  // of every cell and body, at the last history sample

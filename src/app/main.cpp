@@ -4,7 +4,9 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "core/nearest.hpp"
+#include "input/case.hpp"
 #include "input/case_file.hpp"
+#include "input/key_list.hpp"
 #include "output/report.hpp"
 
 #include <CLI/CLI.hpp>
@@ -82,10 +84,11 @@ void share_cores(const Comm& comm) {
 }
 
 struct Command {
-  enum class Kind { run, check, mesh } kind = Kind::run;
+  enum class Kind { run, check, mesh, keys } kind = Kind::run;
   RunOptions options;
   int vertices = 0;
   std::string mesh_path;
+  std::string section;
 };
 
 /// @throws CLI::ParseError  the first word is none of the program's commands
@@ -131,13 +134,16 @@ Command parse(CLI::App& app, int argc, char** argv) {
   mesh->add_option("--vertices", command.vertices, "how many vertices, 200 to 30000")->required();
   mesh->add_option("-o,--output", command.mesh_path, "file to write (.off or .stl)")->required();
 
+  auto* keys = app.add_subcommand("keys", "list every section and key of a case file, with defaults and what is allowed");
+  keys->add_option("section", command.section, "only this one: time, grid, fluid, boundary, cells, ...");
+
   std::vector<std::string> words;  // last first, as the parser wants them; Kokkos takes its own options
   for (int n = argc - 1; n > 0; --n)
     if (std::string(argv[n]).rfind("--kokkos-", 0) != 0) words.push_back(argv[n]);
   if (!words.empty()) check_command(app, words.back());
   app.parse(words);
   for (const auto* used : app.get_subcommands()) check_values(*used);
-  command.kind = *run ? Command::Kind::run : (*check ? Command::Kind::check : Command::Kind::mesh);
+  command.kind = *run ? Command::Kind::run : *check ? Command::Kind::check : *mesh ? Command::Kind::mesh : Command::Kind::keys;
   return command;
 }
 
@@ -148,7 +154,7 @@ bool can_stay_alone(Command& command) {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID",
                            "PALS_RANKID", "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
     if (std::getenv(name)) return false;
-  if (command.kind == Command::Kind::mesh) return true;
+  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys) return true;
   try {
     const auto file = load_case_file(command.options.case_path);
     command.options.case_text = file.text;
@@ -165,6 +171,7 @@ int execute(const Comm& comm, const Command& command) {
       case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
       case Command::Kind::check: check_case(comm, command.options); break;
       case Command::Kind::mesh: write_mesh(command.vertices, command.mesh_path); break;
+      case Command::Kind::keys: info("{}", keys_text(command.section)); break;
     }
     return static_cast<int>(exit_done);
   });

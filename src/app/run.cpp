@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <filesystem>
 
 namespace corpuscle {
@@ -127,6 +128,13 @@ ExitCode estimate_errors(const Comm& comm, const Bars& bars, const Place& main, 
   return code;
 }
 
+/// A word before the making of large meshes, which takes a while.
+void announce_set_up(double vertices) {
+  constexpr double noticeable = 1;
+  const double seconds = estimate_set_up_s(vertices);
+  if (seconds > noticeable) info("set-up:   {:.0f} surface vertices, about {:.2g} s", vertices, seconds);
+}
+
 /// What is refused before anything is built.
 void check_options(const Comm& comm, const Case& scene, const RunOptions& options) {
   if (!options.estimate.empty() && !options.restart.empty())
@@ -174,6 +182,7 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
                    continued(options.restart));
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
+  announce_set_up(measure_scene(scene, comm.size()).vertices);
   const Place place{folder.path(), [&] { folder.begin(); }, folder.run(), fingerprint_files(comm, scene)};
   Ending ending = run_scene(comm, scene, options, place);
   if (!coarser.empty() && ending.code == exit_done)
@@ -188,33 +197,41 @@ void check_case(const Comm& comm, const RunOptions& options) {
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   if (scene.stretching) {
+    announce_set_up(measure_scene(scene, 1).vertices);
     Membranes membranes(scene.cells);
     info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
     info("estimate: {:.0f} MB, {:.2g} s", memory.rank(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
     info("{} is valid", scene.path);
     return;
   }
+  announce_set_up(measure_scene(scene, comm.size()).vertices);
   Timers timers;
+  const auto start = std::chrono::steady_clock::now();
   FlowSimulation simulation(comm, scene, timers);
+  const double set_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const auto& index = simulation.grid().index();
   const double nodes = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,
        simulation.surfaces() ? simulation.surfaces()->vertices : 0);
   print_schedule(simulation.schedule());
+  RunSize size;
+  size.cells = nodes;
+  size.skewed = !simulation.grid().orthogonal();
+  size.vertices = simulation.surfaces() ? simulation.surfaces()->vertices : 0;
+  size.steps = static_cast<double>(simulation.steps_left());
+  size.cores = static_cast<double>(comm.size()) * thread_count();
   if (simulation.membranes()) {
     const auto s = *simulation.coupling()->stability(simulation.next_step_us());
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
          s.margin(), s.mass_term, s.beta, s.threshold());
     auto& membranes = *simulation.membranes();
     const double stable = membranes.stable_step_us();
-    info("membrane: undamped stable step {:.3g} us, {} sub-steps a step", stable,
-         membranes.substeps(simulation.next_step_us(), s.beta));
+    size.membrane_vertices = membranes.vertices();
+    size.substeps = membranes.substeps(scene.time.step_us, s.beta);
+    info("membrane: undamped stable step {:.3g} us, {} sub-steps a step", stable, size.substeps);
   }
-  // Seconds per cell and step on one core, measured with the tube; about ten times that on skewed grids.
-  const double rate = simulation.grid().orthogonal() ? 1.1e-6 : 1e-5;
-  const double cores = static_cast<double>(comm.size()) * thread_count();
-  info("estimate: {:.0f} MB, {} steps, about {:.2g} s", memory.rank() * comm.size(), simulation.steps_left(),
-       rate * nodes * simulation.steps_left() / cores);
+  info("estimate: {:.0f} MB, {} steps, about {:.2g} s, and {:.2g} s to set up", memory.rank() * comm.size(), simulation.steps_left(),
+       estimate_steps_s(size), set_up_s);
   info("{} is valid", scene.path);
 }
 

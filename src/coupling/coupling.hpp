@@ -50,6 +50,8 @@ class Coupling {
   /// and where, for messages (all ranks call). Nearer, the end of the grid disturbs the flow; beyond it there is none.
   virtual bool at_outflow(double) const { return false; }
   virtual std::string nearest_outflow() const { return ""; }
+  /// The limit that at_outflow() asks for, and what sets it.
+  virtual std::string outflow_limit(double) const { return ""; }
 
   /// What the next step depends on beyond the flow and the bodies' positions and velocities, for restarts.
   virtual std::vector<double> state() const { return {}; }

@@ -76,7 +76,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   }
   images_ = make_images(grid.index, options.frame.period);
   find_bounds(lattice_, locate_);
-  std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
+  std::copy(options.guarded.begin(), options.guarded.end(), locate_.guarded);
   std::copy(options.outflow.begin(), options.outflow.end(), locate_.outflow);
   locate_.travellers = options.travellers;
 
@@ -359,6 +359,22 @@ std::string ImmersedBoundary::describe_vertex(int vertex) const {
   const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
   return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y,
                      x.z);
+}
+
+int ImmersedBoundary::nearest_guarded_side(int vertex) const {
+  const int image = to_host(places_.image)(vertex);
+  if (image < 0) return -1;
+  const auto places = to_host(places_.xi);
+  const int item = image * surface_.vertices + vertex;
+  const double xi[3] = {places(item, 0), places(item, 1), places(item, 2)};
+  int nearest = -1;
+  double least = 1e300;
+  for (int side = 0; side < 6; ++side) {
+    const bool here = side % 2 == 0 ? lattice_.boundary_below[side / 2] : lattice_.boundary_above[side / 2];
+    const double gap = spacings_to_side(lattice_, xi, side);
+    if (here && options_.guarded[side] && gap < least) least = gap, nearest = side;
+  }
+  return nearest;
 }
 
 NearBodies ImmersedBoundary::bodies_near(int node) const {

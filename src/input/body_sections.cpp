@@ -15,27 +15,27 @@ BodySettings read_body(Section& s) {
     if (b.shape != shape) s.unused(key, fmt::format("only shape = \"{}\" has this key", name));
     return b.shape == shape;
   };
-  if (needs(Shape::sphere, "sphere", "radius_um")) b.radius_um = s.number("radius_um", positive());
-  if (needs(Shape::ellipsoid, "ellipsoid", "semi_axes_um")) b.semi_axes_um = s.triple("semi_axes_um", positive());
+  if (needs(Shape::sphere, "sphere", "radius_um")) b.radius_um = s.number("radius_um", positive(most_um));
+  if (needs(Shape::ellipsoid, "ellipsoid", "semi_axes_um")) b.semi_axes_um = s.triple("semi_axes_um", positive(most_um));
   if (needs(Shape::file, "file", "file")) b.file = s.file("file", true);
   check_surface_file(s, "file", b.file);
-  if (needs(Shape::file, "file", "scale")) b.scale = s.number("scale", positive(), b.scale);
+  if (needs(Shape::file, "file", "scale")) b.scale = s.number("scale", positive(most_scale), b.scale);
   if (needs(Shape::file, "file", "recenter")) b.recenter = s.flag("recenter", b.recenter);
   if (b.shape == Shape::file)
     s.unused("vertices", "the file decides how many vertices the body has");
   else
     b.vertices = s.integer("vertices", 0, 100000, b.vertices);
   if (b.vertices != 0 && b.vertices < 42) s.fail("vertices", "must be 0 (chosen from the grid) or from 42 to 100000");
-  b.center_um = s.triple("center_um", any_number());
+  b.center_um = s.triple("center_um", between(-most_um, most_um));
   if (b.shape == Shape::sphere) {
     for (const char* key : {"axis", "spin_deg"}) s.unused(key, "a sphere is the same whichever way it is turned");
   } else {
     b.axis = read_axis(s);
     b.spin_deg = s.number("spin_deg", between(-360, 360), b.spin_deg);
   }
-  b.velocity_um_per_us = scaled(s.triple("velocity_mm_per_s", any_number(), Triple{}), units::mm_per_s);
+  b.velocity_um_per_us = scaled(s.triple("velocity_mm_per_s", between(-most_mm_per_s, most_mm_per_s), Triple{}), units::mm_per_s);
   b.angular_velocity_rad_per_us =
-      scaled(s.triple("angular_velocity_rad_per_s", any_number(), Triple{}), units::rad_per_s);
+      scaled(s.triple("angular_velocity_rad_per_s", between(-most_rad_per_s, most_rad_per_s), Triple{}), units::rad_per_s);
   s.finish();
   return b;
 }
@@ -47,12 +47,19 @@ CouplingSettings read_coupling(Section& s) {
   c.scheme = s.choice<Scheme>(
       "scheme", {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated}},
       c.scheme);
-  c.tolerance = s.number("tolerance", between(1e-12, 0.5), c.tolerance);
-  c.max_iterations = s.integer("max_iterations", 1, 10000, c.max_iterations);
   const std::string robin = "robin_coefficient_pg_per_um2_per_us";
-  if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative());
+  s.describe(robin, "a number, 0 or more", "pi times viscosity over grid spacing, or more where stability needs it");
+  if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative(1e12));
   // Up to version 0.1 the scheme was called "aitken", whichever acceleration it used.
   const std::string in_iterated = s.node("robin_in_aitken") ? "robin_in_aitken" : "robin_in_iterated";
+  if (c.scheme != Scheme::iterated) {
+    for (const auto& key : {std::string("tolerance"), std::string("max_iterations"), std::string("acceleration"), in_iterated})
+      s.unused(key, "only scheme = \"iterated\" has this key: the others do not iterate");
+    s.finish();
+    return c;
+  }
+  c.tolerance = s.number("tolerance", between(1e-12, 0.5), c.tolerance);
+  c.max_iterations = s.integer("max_iterations", 1, 10000, c.max_iterations);
   c.robin_in_iterated = s.flag(in_iterated, c.robin_in_iterated);
   const bool robin_term = c.robin_in_iterated && c.robin_coefficient != 0;
   c.acceleration = s.choice<Acceleration>("acceleration", {{"anderson", Acceleration::anderson}, {"aitken", Acceleration::aitken}},
@@ -65,7 +72,7 @@ StretchingSettings read_stretching(Section& s) {
   StretchingSettings p;
   p.force_pN = s.number("force_pN", positive(10000), p.force_pN);
   p.steps = s.integer("steps", 1, 10000, p.steps);
-  p.patch_fraction = s.number("patch_fraction", between(1e-4, 0.5), p.patch_fraction);
+  p.patch_fraction = s.number("patch_fraction", between(1e-4, 0.25), p.patch_fraction);
   p.tolerance = s.number("tolerance", between(1e-12, 0.1), p.tolerance);
   p.max_iterations = s.integer("max_iterations", 1, 1000000000, p.max_iterations);
   p.experiment = s.file("experiment", false);
@@ -78,6 +85,7 @@ namespace {
 void read_fields(Section& s, OutputSettings& o, bool has_fluid) {
   const std::string allowed = "must be true, false or a list of \"velocity\", \"pressure\", \"kind\"";
   o.fields = o.velocity = o.pressure = o.kind = has_fluid;
+  s.describe("fields", allowed.substr(std::string("must be ").size()), "true");
   if (const auto* found = s.node("fields")) {
     if (found->is_boolean()) {
       o.fields = o.velocity = o.pressure = o.kind = *found->value<bool>();

@@ -19,7 +19,7 @@ void check_surface_file(Section& s, const std::string& key, const std::string& p
 }
 
 Triple read_axis(Section& s) {
-  const auto axis = s.triple("axis", any_number(), Triple{0, 0, 1});
+  const auto axis = s.triple("axis", between(-1e6, 1e6), Triple{0, 0, 1});
   if (std::hypot(axis[0], axis[1], axis[2]) < 1e-12) s.fail("axis", "must not be zero: it is a direction");
   return axis;
 }
@@ -63,7 +63,7 @@ void read_mesh_shape(Section& s, CellSettings& c) {
   for (const char* key : {"shape", "diameter_um", "radius_um", "semi_axes_um"})
     s.unused(key, "the mesh file decides the shape (scale = ... its size): leave out this key or mesh");
   c.vertices = 0;
-  c.scale = s.number("scale", positive(), c.scale);
+  c.scale = s.number("scale", positive(most_scale), c.scale);
   c.recenter = s.flag("recenter", c.recenter);
   c.align = s.flag("align", c.align);
 }
@@ -103,18 +103,18 @@ void read_law(Section& s, CellSettings& c) {
 void read_membrane(Section& s, CellSettings& c) {
   using Dissipation = CellSettings::Dissipation;
   read_law(s, c);
-  c.shear_modulus_uN_per_m = s.number("shear_modulus_uN_per_m", positive(), c.shear_modulus_uN_per_m);
+  c.shear_modulus_uN_per_m = s.number("shear_modulus_uN_per_m", positive(most_uN_per_m), c.shear_modulus_uN_per_m);
   // The default passes through the same conversion as a value from a file, so that the echo reads back to the same
   // bits.
-  c.bending_modulus_fJ = s.number("bending_modulus_J", not_negative(), 2.4e-19) * units::J;
-  c.area_modulus_uN_per_m = s.number("area_modulus_uN_per_m", not_negative(), c.area_modulus_uN_per_m);
-  c.local_area_modulus_uN_per_m = s.number("local_area_modulus_uN_per_m", not_negative(), c.local_area_modulus_uN_per_m);
+  c.bending_modulus_fJ = s.number("bending_modulus_J", not_negative(most_J), 2.4e-19) * units::J;
+  c.area_modulus_uN_per_m = s.number("area_modulus_uN_per_m", not_negative(most_uN_per_m), c.area_modulus_uN_per_m);
+  c.local_area_modulus_uN_per_m = s.number("local_area_modulus_uN_per_m", not_negative(most_uN_per_m), c.local_area_modulus_uN_per_m);
   if (c.law == Law::wlc_pow && c.local_area_modulus_uN_per_m == 0)
     s.fail("local_area_modulus_uN_per_m",
            "must be above 0: with springs and the total area alone triangles can collapse or fold at no cost, the problem "
            "is ill-posed and solutions get stuck");
-  c.volume_modulus_Pa = s.number("volume_modulus_Pa", not_negative(), c.volume_modulus_Pa);
-  c.membrane_viscosity_N_s_per_m = s.number("membrane_viscosity_N_s_per_m", not_negative(), c.membrane_viscosity_N_s_per_m);
+  c.volume_modulus_Pa = s.number("volume_modulus_Pa", not_negative(most_Pa), c.volume_modulus_Pa);
+  c.membrane_viscosity_N_s_per_m = s.number("membrane_viscosity_N_s_per_m", not_negative(most_N_s_per_m), c.membrane_viscosity_N_s_per_m);
   c.dissipation =
       s.choice<Dissipation>("dissipation", {{"central", Dissipation::central}, {"full", Dissipation::full}}, c.dissipation);
 }
@@ -128,7 +128,7 @@ void read_constants(Section& s, CellSettings& c) {
     read_built_in_shape(s, c);
   else
     read_mesh_shape(s, c);
-  c.mass_pg = s.number("mass_pg", positive(), c.mass_pg);
+  c.mass_pg = s.number("mass_pg", positive(most_pg), c.mass_pg);
   read_rest(s, c);
   c.interior = s.choice<Interior>("interior", {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
   if (c.interior == Interior::cytosol)
@@ -137,7 +137,8 @@ void read_constants(Section& s, CellSettings& c) {
 }
 
 void read_place(Section& s, CellSettings& c, bool placed) {
-  c.center_um = placed ? s.triple("center_um", any_number()) : s.triple("center_um", any_number(), Triple{});
+  const Bounds anywhere = between(-most_um, most_um);
+  c.center_um = placed ? s.triple("center_um", anywhere) : s.triple("center_um", anywhere, Triple{});
   c.axis = read_axis(s);
   c.spin_deg = s.number("spin_deg", between(-360, 360), c.spin_deg);
 }

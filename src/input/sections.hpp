@@ -5,6 +5,10 @@
 
 namespace corpuscle {
 
+// Beyond any cell's by orders of magnitude: what is larger is a slip of the unit, and sums of squares would overflow.
+constexpr double most_um = 1e7, most_uN_per_m = 1e9, most_J = 1e-9, most_Pa = 1e12, most_N_s_per_m = 1, most_pg = 1e12;
+constexpr double most_mm_per_s = 1e9, most_rad_per_s = 1e12, most_scale = 1e12;
+
 TimeSettings read_time(Section& s);
 GridSettings read_grid(Section& s);
 FluidSettings read_fluid(Section& s);

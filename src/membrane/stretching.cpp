@@ -51,7 +51,7 @@ class Stretcher {
     step.residual = outcome.force / scale;
     if (!outcome.at_rest) fail(step);
     step.cell = membranes_.diagnostics()[0];
-    if (!(step.cell.stretch < strain_limit(membranes_.law(0)))) fail(step);
+    if (!(step.cell.stretch < strain_limit(membranes_.law(0)))) overstretched(step);
     const Triple extent = step.cell.extent_um();
     step.axial_um = extent[0];
     step.transverse_um = extent[1];
@@ -63,6 +63,13 @@ class Stretcher {
     auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), search_.applied());
     for (int k = 0; k < 2 * patch_; ++k) host(ends_[k], 0) = k < patch_ ? vertex_force : -vertex_force;
     Kokkos::deep_copy(search_.applied(), host);
+  }
+
+  [[noreturn]] void overstretched(const StretchingStep& step) {
+    throw ComputationError(fmt::format(
+        "stretching: at {:.4g} pN the force is beyond what the model holds: {}, which none can pass; lower stretching.force_pN, raise "
+        "cells.0.shear_modulus_uN_per_m, or spread the force (stretching.patch_fraction)",
+        step.force_pN, stretch_text(membranes_.law(0), step.cell.stretch)));
   }
 
   [[noreturn]] void fail(const StretchingStep& step) {

@@ -120,9 +120,23 @@ const char* unit_of_scale(double scale) {
   return "";
 }
 
+/// @throws InputError  for a surface with handles, which is no cell's
+void check_cell_topology(const CellSettings& cell, FileSurface& s) {
+  constexpr int few = 100;
+  const int vertices = static_cast<int>(s.mesh.vertices.size()), triangles = static_cast<int>(s.mesh.triangles.size());
+  const int handles = (2 - vertices + triangles / 2) / 2;  // Euler: V - E + F = 2 - 2 handles, with three edges for two triangles
+  if (handles != 0)
+    refuse(cell.mesh, fmt::format("it has {} handle{}, like a ring, and a cell's membrane is a sphere pressed flat, without holes; give "
+                                  "a surface without",
+                                  handles, handles == 1 ? "" : "s"));
+  if (vertices < few)
+    s.warnings.push_back(fmt::format("{} vertices are too few for the shape of a cell: the built-in one has 200 at least", vertices));
+}
+
 FileSurface read_cell_surface(const CellSettings& cell) {
   FileSurface s = read_scaled(cell.mesh, cell.scale);
   check_cell_size(cell, s);
+  check_cell_topology(cell, s);
   const double angle = std::acos(std::clamp(s.axis[2], -1.0, 1.0)) / units::degree;
   constexpr double upright = 1;  // degrees: an uneven mesh's axis is not truer
   if (cell.recenter) {

@@ -98,6 +98,7 @@ TEST_CASE("wrong values: file, line, key, value and what is allowed") {
       {"[fluid]",
        "[fluid]\npressure_gradient_Pa_per_um = [0, 0, 1]",
        {":10: fluid.pressure_gradient_Pa_per_um", "needs a pair of periodic sides"}},
+      {"[fluid]", "[fluid]\ndensity_pg_per_um3 = 1e300", {":10: fluid.density_pg_per_um3 = 1e+300", "at most"}},
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = true", {":13: boundary.0.velocity_mm_per_s = true", "mean speed"}},
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = [1, 2]", {":13: boundary.0.velocity_mm_per_s", "three numbers"}},
       {"\"velocity_inlet\"", "\"inlet\"", {":12: boundary.0.type", "one of \"velocity_inlet\", \"outflow\""}},
@@ -174,6 +175,20 @@ TEST_CASE("grid generators take their own keys only") {
   require_parts(grid("generator = \"file\"\nnodes = [5, 5, 5]"), {":6: grid.nodes", "the file decides"});
 }
 
+TEST_CASE("a pressure gradient along a direction that is not periodic is refused, one along a periodic one is not") {
+  auto slit = flow;
+  for (const char* side : {"i_min", "i_max"}) {
+    const std::string entry = "side = \"" + std::string(side) + "\"\ntype = ";
+    slit = replaced(slit, entry + "\"wall\"", entry + "\"periodic\"");
+  }
+  const auto with = [&](const std::string& value) {
+    return message(replaced(slit, "[fluid]\n", "[fluid]\npressure_gradient_Pa_per_um = " + value + "\n"));
+  };
+  CHECK(with("[-0.8, 0, 0]") == "accepted");
+  require_parts(with("[-0.8, 0, 1e-3]"), {":10: fluid.pressure_gradient_Pa_per_um", "z component drives nothing", "k_min and k_max"});
+  require_parts(with("[0, 0.5, 0]"), {":10: fluid.pressure_gradient_Pa_per_um", "y component drives nothing", "j_min and j_max"});
+}
+
 TEST_CASE("boundaries must make sense together") {
   const auto with = [](const std::string& from, const std::string& to) { return message(replaced(flow, from, to)); };
   require_parts(with("\"j_max\"", "\"j_min\""), {":27: boundary.5.side", "already has a [[boundary]] (boundary.4)"});
@@ -234,7 +249,16 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell(from_file + "recenter = 1"), {":13: cells.0.recenter = 1", "true or false"});
   require_parts(cell(from_file + "recentre = true"), {":13: cells.0.recentre", "did you mean 'recenter'?"});
   require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"iterated\", \"loose\""});
-  require_parts(cell("[coupling]\ntolerance = 1"), {":13: coupling.tolerance = 1", "from 1e-12 to 0.5"});
+  require_parts(cell("[coupling]\nscheme = \"iterated\"\ntolerance = 1"), {":14: coupling.tolerance = 1", "from 1e-12 to 0.5"});
+  for (const char* key : {"tolerance = 1e-4", "max_iterations = 5", "acceleration = \"aitken\"", "robin_in_iterated = false"})
+    require_parts(cell("[coupling]\n" + std::string(key)),
+                  {":13: coupling." + std::string(key).substr(0, std::string(key).find(' ')), "only scheme = \"iterated\""});
+  for (const char* key : {"shear_modulus_uN_per_m = 1e300", "volume_modulus_Pa = 1e300", "axis = [1e200, 0, 1e200]", "mass_pg = 1e300"}) {
+    const std::string name(key, std::string(key).find(' '));
+    require_parts(cell(key), {":12: cells.0." + name, "must be", "a number"});
+  }
+  require_parts(message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [1e300, 0, 0]\n")),
+                {":11: cells.0.center_um = [1e+300, 0, 0]", "each a number from -1"});
   require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
 
   const auto body = [](const std::string& text) {
