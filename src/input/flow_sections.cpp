@@ -9,7 +9,6 @@
 namespace corpuscle {
 namespace {
 
-constexpr double most_um = 1e7;  // of a grid: volumes and their squares stay far from the largest numbers
 
 void read_centerline(Section& s, GridSettings& grid) {
   using Centerline = GridSettings::Centerline;

@@ -74,7 +74,8 @@ Read reader_of(const std::string& name) {
   if (name == "grid") return read_grid;
   if (name == "fluid") return read_fluid;
   if (name == "boundary") return read_boundary;
-  if (name == "cells") return [](Section& s) { read_cell(s, true); };
+  if (name == "cell_types") return [](Section& s) { read_cell_type(s, {}); };
+  if (name == "cells") return [](Section& s) { read_cell(s, {}, true); };
   if (name == "bodies") return read_body;
   if (name == "coupling") return read_coupling;
   if (name == "stretching") return read_stretching;
