@@ -53,8 +53,11 @@ void take_up(const Case& before, double until, const std::string& resolved_befor
   const auto file = std::filesystem::temp_directory_path() / ("corpuscle_restart_" + std::to_string(getpid()) + ".h5");
   Run run(before);
   while (run.simulation.time() < until) run.simulation.step();
-  write_checkpoint(file.string(), run.simulation, resolved_before, "{}");
-  read_checkpoint(file.string(), after.simulation, resolved_after);
+  CheckpointTexts texts;
+  texts.resolved = resolved_before;
+  texts.totals = "{}";
+  write_checkpoint(file.string(), run.simulation, texts);
+  read_checkpoint(file.string(), after.simulation, resolved_after, "");
   std::filesystem::remove(file);
   if (compare) compare(run.simulation);
 }
