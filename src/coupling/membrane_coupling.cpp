@@ -77,8 +77,11 @@ void MembraneCoupling::watch_outflow() {
        "lengthen the grid", nearest_outflow(), outflow_limit_);
 }
 
-/// How far the fluid gets in two steps: a cell that is nearer may leave the grid before it is looked at again.
-double MembraneCoupling::two_steps_um(double dt) const { return 2 * fluid_.statistics().speed * dt; }
+/// How far the fluid gets in two steps, now or at the fastest that is prescribed: a cell that is nearer may leave the grid
+/// before it is looked at again.
+double MembraneCoupling::two_steps_um(double dt) const {
+  return 2 * std::max(fluid_.statistics().speed, fluid_.boundaries().largest_speed()) * dt;
+}
 
 bool MembraneCoupling::at_outflow(double dt) const {
   return immersed_->outflow_um() < std::max(outflow_limit_, two_steps_um(dt));
