@@ -53,6 +53,7 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const
     options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
   }
   options.outflow = leaving.sides;
+  if (fluid.boundaries().has_outflow()) options.pressure_given = fluid.boundaries().outflow();
   options.travellers = leaving.vertices;
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;

@@ -77,10 +77,11 @@ void MembraneCoupling::watch_outflow() {
        "lengthen the grid", nearest_outflow(), outflow_limit_);
 }
 
-/// How far the fluid gets in two steps, now or at the fastest that is prescribed: a cell that is nearer may leave the grid
-/// before it is looked at again.
+/// How far the fluid gets in two steps at the fastest that it has been: a cell that is nearer may leave the grid before it is
+/// looked at again. A reference speed that is only the one told from rest says nothing of it.
 double MembraneCoupling::two_steps_um(double dt) const {
-  return 2 * std::max(fluid_.statistics().speed, fluid_.boundaries().largest_speed()) * dt;
+  const auto& fluid = fluid_.statistics();
+  return 2 * dt * (fluid.reference_speed > quiet_speed_ ? fluid.reference_speed : fluid.speed);
 }
 
 bool MembraneCoupling::at_outflow(double dt) const {

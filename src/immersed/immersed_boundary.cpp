@@ -106,6 +106,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   if (periodic()) laps_ = Table<int>("corpuscle::immersed::laps", surface.bodies, 3);
   Kokkos::deep_copy(places_.status, Located::failed);
   Kokkos::deep_copy(extended_, std::int8_t{0});
+  if (options.pressure_given.data()) mark_known_pressure(options.pressure_given, extended_);
   if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
   box_host_ = HostCopy(places_.box);
   found_host_ = HostCopy(places_.found);

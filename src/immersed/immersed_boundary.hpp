@@ -24,6 +24,7 @@ struct ImmersedOptions {
   std::function<void(const Array<std::int8_t>&)> exchange;
   std::array<bool, 6> outflow{}; // sides through which the first `travellers` vertices, those of cells, may leave
   int travellers = 0;
+  Array<unsigned char> pressure_given;   // [cell] boundary nodes where the pressure is known, those of outflow sides; empty for none
 };
 
 /// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
