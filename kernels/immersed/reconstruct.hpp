@@ -274,7 +274,8 @@ struct StencilInput {
   PseudoNormals normals;
   BandViews band;
   NodeViews nodes;
-  Array<std::int8_t> extended;  // [cell] whether an immersed node gets a pressure from fluid nodes, and a boundary node has a given one; halos filled
+  /// [cell] whether an immersed node gets a pressure from fluid nodes, and a boundary node has a given one; halos filled.
+  Array<std::int8_t> extended;
 };
 
 KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row& row, RowKind kind,

@@ -247,7 +247,7 @@ int ImmersedBoundary::absorb_pockets(const NodeBox& box) {
     const long own = count_unreached(index, box, nodes_, reached_);
     return options_.sum ? options_.sum(own) : own;
   };
-  Kokkos::deep_copy(Exec(), reached_, std::int8_t{1});  // outside this rank's box, which another rank's may overlap
+  if (options_.exchange) Kokkos::deep_copy(Exec(), reached_, std::int8_t{1});  // beyond the box, which another rank's may overlap
   seed_open_fluid(index, box, faces, band_, nodes_, reached_);
   long unreached = left();
   // Owned nodes alone tell the end: what a rank has reached in its halo is gone with the next exchange.

@@ -136,16 +136,7 @@ TEST_CASE("sheets stretched far have the tensions of their laws' closed forms") 
 TEST_CASE("a Skalak triangle has the energy of its principal stretches, whatever its shape") {
   const double C = 3;
   const Skalak law{{0.7, C}};
-  const Vec3 corner[3] = {{0.1, 0.2, 0}, {0.9, -0.1, 0}, {0.3, 0.8, 0}};
-  const double area = 0.5 * cross(corner[1] - corner[0], corner[2] - corner[0]).z;
-  TriangleRest rest{};
-  rest.area = area;
-  const TriangleShape at_rest = triangle_shape(corner, {0, 0, 1}, area);
-  for (int k = 0; k < 3; ++k) rest.length[k] = at_rest.length[k];
-  const double a = 1.3, b = 0.8;  // along x and y
-  Vec3 moved[3];
-  for (int k = 0; k < 3; ++k) moved[k] = {a * corner[k].x, b * corner[k].y, 0};
-  const TriangleShape shape = triangle_shape(moved, {0, 0, 1}, a * b * area);
+  const auto [a, b, area, rest, moved, shape] = StretchedTriangle();
   const double i1 = a * a + b * b - 2, i2 = a * a * b * b - 1;
   CHECK(law.energy(shape, rest) == Approx(area * 0.7 / 4 * (i1 * i1 + 2 * i1 - 2 * i2 + C * i2 * i2)).epsilon(1e-12));
   CHECK(law.strain(shape, rest) == Approx(a).epsilon(1e-12));

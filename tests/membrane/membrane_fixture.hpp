@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <random>
@@ -74,6 +75,27 @@ class Noise {
 
  private:
   std::mt19937 engine_{20210406};
+};
+
+/// A triangle without symmetry, at rest and stretched along x and y.
+struct StretchedTriangle {
+  double a = 1.3, b = 0.8;  // along x and y
+  double area = 0;          // at rest
+  TriangleRest rest{};
+  std::array<Vec3, 3> moved;
+  TriangleShape shape;
+
+  StretchedTriangle() {
+    const Vec3 corner[3] = {{0.1, 0.2, 0}, {0.9, -0.1, 0}, {0.3, 0.8, 0}};
+    area = rest.area = 0.5 * cross(corner[1] - corner[0], corner[2] - corner[0]).z;
+    const TriangleShape at_rest = triangle_shape(corner, {0, 0, 1}, area);
+    Vec3 at[3];
+    for (int k = 0; k < 3; ++k) {
+      rest.length[k] = at_rest.length[k];
+      at[k] = moved[k] = {a * corner[k].x, b * corner[k].y, 0};
+    }
+    shape = triangle_shape(at, {0, 0, 1}, a * b * area);
+  }
 };
 
 /// A cell stretched, sheared and shaken: no symmetry left, every term at work, no link near its limit.
