@@ -126,8 +126,9 @@ struct BodySettings {
 
 /// [coupling]
 struct CouplingSettings {
-  enum class Scheme { robin, iterated, loose };
+  enum class Scheme { robin, iterated, loose, force };
   enum class Acceleration { anderson, aitken };
+  enum class Kernel { three_point, four_point };
 
   Scheme scheme = Scheme::robin;
   double tolerance = 1e-3;              // iterated: residual over the step's displacement
@@ -135,6 +136,8 @@ struct CouplingSettings {
   std::optional<Acceleration> acceleration;  // iterated; by default Anderson's with a Robin term, Aitken's without
   double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see MembraneCoupling::stability)
   bool robin_in_iterated = true;
+  Kernel kernel = Kernel::three_point;  // force
+  bool slip = true;                     // force
 
   bool operator==(const CouplingSettings&) const = default;
 };
