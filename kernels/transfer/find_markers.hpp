@@ -35,7 +35,8 @@ KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const Latti
     const double xi = q.xi(d);
     eta[d] = xi;
     if (lattice.boundary_below[d] && xi < 0) eta[d] = 0.5 * xi;
-    if (lattice.boundary_above[d] && xi > lattice.index.n[d] - 1) eta[d] = lattice.index.n[d] - 1 + 0.5 * (xi - (lattice.index.n[d] - 1));
+    if (lattice.boundary_above[d] && xi > lattice.index.n[d] - 1)
+      eta[d] = lattice.index.n[d] - 1 + 0.5 * (xi - (lattice.index.n[d] - 1));
   }
 }
 
@@ -71,8 +72,7 @@ KOKKOS_INLINE_FUNCTION Vec3 image_position(const PeriodImages& images, const Vec
 /// Start for the image m of a vertex that was found as image `from` at xi.
 KOKKOS_INLINE_FUNCTION void image_guess(const MarkerSearch& s, const double (&xi)[3], int from, int m, LatticePoint& q) {
   double start[3];
-  for (int d = 0; d < 3; ++d)
-    start[d] = xi[d] + (s.images.turns[m][d] - s.images.turns[from][d]) * s.lattice.index.global[d];
+  for (int d = 0; d < 3; ++d) start[d] = xi[d] + (s.images.turns[m][d] - s.images.turns[from][d]) * s.lattice.index.global[d];
   s.lattice.set(q, start);
 }
 
@@ -91,7 +91,8 @@ inline void find_images(const MarkerSearch& search, const Components<double>& x,
         int found = -1;
         for (int m = 0; m < s.images.count; ++m) {
           const Vec3 p = image_position(s.images, here, m);
-          if (!(p.x >= s.lower.x && p.x <= s.upper.x && p.y >= s.lower.y && p.y <= s.upper.y && p.z >= s.lower.z && p.z <= s.upper.z))
+          if (!(p.x >= s.lower.x && p.x <= s.upper.x && p.y >= s.lower.y && p.y <= s.upper.y && p.z >= s.lower.z &&
+                p.z <= s.upper.z))
             continue;
           LatticePoint q;
           if (from >= 0) image_guess(s, xi, from, m, q);
@@ -133,9 +134,10 @@ inline int number_markers(const VertexPlaces& places) {
   return total;
 }
 
-/// Fills x, vertex, home and eta of the markers. Which node is nearest is rounded, so that ranks which see the same point under
+/// Fills vertex, home and eta of the markers. Which node is nearest is rounded, so that ranks which see the same point under
 /// a shift agree on the tie.
-inline void fill_markers(const MarkerSearch& search, const Components<double>& x, const VertexPlaces& places, const MarkerViews& markers) {
+inline void fill_markers(const MarkerSearch& search, const Components<double>& x, const VertexPlaces& places,
+                         const MarkerViews& markers) {
   const MarkerSearch s = search;
   const VertexPlaces in = places;
   const MarkerViews out = markers;
@@ -158,9 +160,9 @@ inline void fill_markers(const MarkerSearch& search, const Components<double>& x
             if (s.lattice.boundary_above[d] && eta[d] > s.lattice.index.n[d] - 0.5) eta[d] = s.lattice.index.n[d] - 0.5;
             out.eta(marker, d) = eta[d];
             const double nearest = std::floor(std::floor((eta[d] + 0.5) * 1073741824.0 + 0.5) / 1073741824.0);
-            home = home && (nearest >= 0 || s.lattice.boundary_below[d]) && (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
+            home = home && (nearest >= 0 || s.lattice.boundary_below[d]) &&
+                   (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
           }
-          store(out.x, marker, p);
           out.vertex(marker) = v;
           out.home(marker) = home ? 1 : 0;
           ++marker;
@@ -172,7 +174,8 @@ inline int count_at_home(const MarkerViews& markers) {
   const auto home = markers.home;
   int count = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::transfer::count_at_home", Policy(0, markers.count), KOKKOS_LAMBDA(int m, int& sum) { sum += home(m); }, count);
+      "corpuscle::transfer::count_at_home", Policy(0, markers.count), KOKKOS_LAMBDA(int m, int& sum) { sum += home(m); },
+      count);
   return count;
 }
 

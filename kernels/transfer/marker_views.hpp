@@ -6,20 +6,20 @@
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 310 bytes.
 struct MarkerViews {
   int count = 0;
-  Components<double> x;         // [marker, 3] um, moved by periods
   Array<int> vertex;            // [marker] where it comes from
   Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex, of all ranks, that lies in its rank's own cells
   Table<double> eta;            // [marker, 3] position in index space: cells of this rank at 0, 1, ...; walls half a cell away
-  Table<int> base;              // [marker, 6] first cell, then first face, along each direction that it reaches
+  Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
   Table<double> weight;         // [marker, 6 points] of those lines of points
   Table<double> inverse;        // [marker, 9] of the matrix of face areas that it sees, 1/um2
   Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
   Components<double> velocity;  // [marker, 3] um/us: its share of its vertex's
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers
+  Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces
 };
 
 /// The rank's block as markers see it.
@@ -43,8 +43,8 @@ template <class Delta>
 struct DeltaLine {
   int base = 0;
   double weight[Delta::points];
-  int row[Delta::points];   // the point itself, or its mirror image if it lies beyond a side
-  int end[Delta::points];   // of the side that it lies beyond: 0 low, 1 high; -1 for none
+  int row[Delta::points];  // the point itself, or its mirror image if it lies beyond a side
+  int end[Delta::points];  // of the side that it lies beyond: 0 low, 1 high; -1 for none
 };
 
 template <class Delta>
@@ -59,7 +59,8 @@ KOKKOS_INLINE_FUNCTION DeltaLine<Delta> delta_line(const TransferBlock& block, i
     line.row[p] = i;
     line.end[p] = -1;
     if (block.lattice.boundary_below[e] && i < 0) line.row[p] = faces ? -i : -1 - i, line.end[p] = 0;
-    if (block.lattice.boundary_above[e] && i > (faces ? n : n - 1)) line.row[p] = faces ? 2 * n - i : 2 * n - 1 - i, line.end[p] = 1;
+    if (block.lattice.boundary_above[e] && i > (faces ? n : n - 1))
+      line.row[p] = faces ? 2 * n - i : 2 * n - 1 - i, line.end[p] = 1;
   }
   return line;
 }

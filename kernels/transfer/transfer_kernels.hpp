@@ -18,7 +18,8 @@ KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double
   for (int k = 0; k < Delta::points; ++k)
     for (int j = 0; j < Delta::points; ++j)
       for (int i = 0; i < Delta::points; ++i) {
-        const int row[3] = {line[0].row[i], line[1].row[j], line[2].row[k]}, end[3] = {line[0].end[i], line[1].end[j], line[2].end[k]};
+        const int row[3] = {line[0].row[i], line[1].row[j], line[2].row[k]},
+                  end[3] = {line[0].end[i], line[1].end[j], line[2].end[k]};
         visit(block.index().cell(row[0], row[1], row[2]), line[0].weight[i] * line[1].weight[j] * line[2].weight[k], row, end);
       }
 }
@@ -40,15 +41,17 @@ void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& mar
             double folded[points] = {};
             for (int p = 0; p < points; ++p) {
               const int to = line.row[p] - line.base;  // out of range where the weight is zero
-              if (to >= 0 && to < points) folded[to] += line.end[p] < 0 ? line.weight[p] : block.reflection[e][line.end[p]][faces] * line.weight[p];
+              if (to >= 0 && to < points)
+                folded[to] += line.end[p] < 0 ? line.weight[p] : block.reflection[e][line.end[p]][faces] * line.weight[p];
             }
-            m.base(marker, 3 * faces + e) = line.base;
+            m.base(marker, 3 * faces + e) = static_cast<short>(line.base);
             for (int p = 0; p < points; ++p) m.weight(marker, (3 * faces + e) * points + p) = folded[p];
           }
         Vec3 seen[3];
         for (int d = 0; d < 3; ++d) {
           Vec3 sum;
-          visit_faces<Delta>(block, eta, d, [&](int c, double w, const int (&)[3], const int (&)[3]) { sum += w * load(block.area[d], c); });
+          visit_faces<Delta>(block, eta, d,
+                             [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.area[d], c); });
           seen[d] = sum;
         }
         // Columns of the inverse of the matrix with rows seen[d].
@@ -72,6 +75,28 @@ inline void resolve_forces(const MarkerViews& markers, const Components<double>&
       });
 }
 
+/// m.near, so that cells without markers are passed over.
+template <class Delta>
+void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  Kokkos::deep_copy(Exec(), m.near, static_cast<unsigned char>(0));
+  Kokkos::parallel_for(
+      "corpuscle::transfer::mark_near", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        int lower[3], upper[3];
+        for (int e = 0; e < 3; ++e) {
+          const int cell = m.base(marker, e), face = m.base(marker, 3 + e);
+          lower[e] = cell < face ? cell : face;
+          upper[e] = (cell < face ? face : cell) + Delta::points;
+          lower[e] = lower[e] > 0 ? lower[e] : 0;
+          upper[e] = upper[e] < block.rows(e, true) ? upper[e] : block.rows(e, true);
+        }
+        for (int k = lower[2]; k < upper[2]; ++k)
+          for (int j = lower[1]; j < upper[1]; ++j)
+            for (int i = lower[0]; i < upper[0]; ++i) m.near(block.index().cell(i, j, k)) = 1;
+      });
+}
+
 /// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
 template <class Delta>
 void spread_forces(const TransferBlock& block, const MarkerViews& markers, const FaceForce& force) {
@@ -79,35 +104,36 @@ void spread_forces(const TransferBlock& block, const MarkerViews& markers, const
   const IndexSpace index = block.index();
   const FaceForce out = force;
   constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;  // cells whose markers reach a cell or its low faces
-  for_box("corpuscle::transfer::spread_forces", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
-          KOKKOS_LAMBDA(int i, int j, int k) {
-            constexpr int points = Delta::points;
-            const int at[3] = {i, j, k};
-            double sum[3] = {0, 0, 0};
-            for (int dk = below; dk <= above; ++dk)
-              for (int dj = below; dj <= above; ++dj) {
-                const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
-                for (int s = m.start(line); s < end; ++s) {
-                  const int marker = m.order(s);
-                  double w[6];
-                  for (int e = 0; e < 6; ++e) {
-                    const int p = at[e % 3] - m.base(marker, e);
-                    w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
-                  }
-                  sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
-                  sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
-                  sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
-                }
+  for_box(
+      "corpuscle::transfer::spread_forces", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
+      KOKKOS_LAMBDA(int i, int j, int k) {
+        constexpr int points = Delta::points;
+        const int at[3] = {i, j, k}, c = index.cell(i, j, k);
+        const int last = m.near(c) ? above : below - 1;
+        double sum[3] = {0, 0, 0};
+        for (int dk = below; dk <= last; ++dk)
+          for (int dj = below; dj <= above; ++dj) {
+            const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
+            for (int s = m.start(line); s < end; ++s) {
+              const int marker = m.order(s);
+              double w[6];
+              for (int e = 0; e < 6; ++e) {
+                const int p = at[e % 3] - m.base(marker, e);
+                w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
               }
-            const int c = index.cell(i, j, k);
-            for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
-          });
+              sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
+              sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
+              sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
+            }
+          }
+        for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
+      });
 }
 
 /// Velocity that the sides give, where the face's point is reflected last along `last`: beyond other sides too it is itself
 /// reflected, on from the side along that direction. Exact where the velocity is linear.
-KOKKOS_INLINE_FUNCTION Vec3 given_velocity(const TransferBlock& block, const Components<double>& u, int d, int last, const int (&row)[3],
-                                           const int (&end)[3]) {
+KOKKOS_INLINE_FUNCTION Vec3 given_velocity(const TransferBlock& block, const Components<double>& u, int d, int last,
+                                           const int (&row)[3], const int (&end)[3]) {
   const IndexSpace& index = block.index();
   Vec3 sum;
   for (int on_side = 0; on_side < 8; ++on_side) {  // bit e: the point lies on the side along e
@@ -170,17 +196,20 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
             for (int b = 0; b < points; ++b) {
               const int j = m.base(marker, 1 + (d == 1 ? 3 : 0)) + b;
               if (!block.owns(1, d == 1, j)) continue;
-              const double w = m.weight(marker, (1 + (d == 1 ? 3 : 0)) * points + b) * m.weight(marker, (2 + (d == 2 ? 3 : 0)) * points + c);
+              const double w =
+                  m.weight(marker, (1 + (d == 1 ? 3 : 0)) * points + b) * m.weight(marker, (2 + (d == 2 ? 3 : 0)) * points + c);
               for (int a = 0; a < points; ++a) {
                 const int i = m.base(marker, d == 0 ? 3 : 0) + a;
-                if (block.owns(0, d == 0, i)) sum += w * m.weight(marker, (d == 0 ? 3 : 0) * points + a) * through(d, index.cell(i, j, k));
+                if (block.owns(0, d == 0, i))
+                  sum += w * m.weight(marker, (d == 0 ? 3 : 0) * points + a) * through(d, index.cell(i, j, k));
               }
             }
           }
           if (folded)
-            visit_faces<Delta>(block, eta, d, [&](int c, double w, const int (&row)[3], const int (&end)[3]) {
+            visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&end)[3]) {
               const bool beyond = end[0] >= 0 || end[1] >= 0 || end[2] >= 0;
-              if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2])) return;
+              if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2]))
+                return;
               sum += w * given_flux(block, u, d, row, end, load(block.area[d], c));
             });
           velocity += sum * inverse_column(m, marker, d);

@@ -52,7 +52,7 @@ FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulat
   columns.bodies = simulation.rigid_bodies() != nullptr;
   if (columns.cells) columns.more = shape_columns;
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
-  if (simulation.immersed()) history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
+  if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
 #ifdef CORPUSCLE_HDF5
   if (scene.output.fields)
     fields_ = std::make_unique<FieldWriter>(folder, comm, simulation.grid().index(),
@@ -157,7 +157,7 @@ void FlowOutput::measure() {
     watch_cells(cells);
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
-    const auto travelled = simulation_.immersed()->wrapped_by();
+    const auto travelled = simulation_.coupling()->wrapped_by();
     for (int c = 0; c < simulation_.cells(); ++c) {
       auto sample = cell_sample(c, cells[c], travelled[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape_columns.size() + balance_columns.size(), std::nan(""));
@@ -221,7 +221,7 @@ void FlowOutput::write_cells() {
   if (simulation_.steps() > 0) {
     simulation_.coupling()->tractions_for_output();
     const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
-    totals_.slip = larger(totals_.slip, simulation_.immersed()->slip()[1] / speed);
+    if (simulation_.immersed()) totals_.slip = larger(totals_.slip, simulation_.immersed()->slip()[1] / speed);
   }
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;
@@ -313,7 +313,7 @@ void FlowOutput::fill_totals(Report& report, const RunTotals& now) const {
   errors["max_divergence"] = now.divergence;
   errors["flux_correction"] = now.flux_correction;
   errors["splitting"] = now.splitting;
-  if (simulation_.surfaces()) {
+  if (simulation_.immersed()) {
     errors["slip"] = now.slip;
     const auto& search = now.immersed;
     report.extra["immersed"] = {{"classifications", search.classifications},
@@ -330,8 +330,10 @@ void FlowOutput::fill_totals(Report& report, const RunTotals& now) const {
   if (simulation_.membranes()) {
     errors["volume_drift"] = now.volume_drift;
     errors["area_drift"] = now.area_drift;
-    errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
-    errors["coupling_residual_max"] = now.residual.largest;
+    if (simulation_.immersed()) {
+      errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
+      errors["coupling_residual_max"] = now.residual.largest;
+    }
     report.extra["stability"] = simulation_.coupling()->report(simulation_.last_step_us());
   }
   fill_energy(report);
@@ -363,7 +365,7 @@ void FlowOutput::fill(Report& report) {
   fill_totals(report, totals_now());
   auto& errors = report.errors;
   errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
-  if (simulation_.surfaces()) {
+  if (simulation_.immersed()) {
     const auto fits = simulation_.immersed()->traction_fits();
     report.extra["immersed"]["traction_fits"] = fits;
     errors["traction_fallbacks"] = poor_share(fits);

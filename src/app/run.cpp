@@ -141,7 +141,10 @@ void check_case(const Comm& comm, const RunOptions& options) {
   info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,
        simulation.surfaces() ? simulation.surfaces()->vertices : 0);
   print_schedule(simulation.schedule());
-  if (simulation.membranes()) {
+  const std::string stability = simulation.coupling() ? simulation.coupling()->stability_text(simulation.next_step_us()) : "";
+  if (!stability.empty()) {
+    info("{}", stability);
+  } else if (simulation.membranes()) {
     const auto s = *simulation.coupling()->stability(simulation.next_step_us());
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
          s.margin(), s.mass_term, s.beta, s.threshold());

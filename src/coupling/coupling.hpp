@@ -43,8 +43,10 @@ class Coupling {
   virtual const Components<double>& tractions_for_output() = 0;
   /// Which bodies the grid resolves coarsely, as check_start() warned of; "" if none.
   virtual std::string coarse() const { return {}; }
-  /// For a step of that length; nothing where no membrane is coupled.
+  /// For a step of that length; nothing where no membrane with mass is coupled.
   virtual std::optional<StabilityEstimate> stability(double) const { return std::nullopt; }
+  /// What there is to say of it where there is no such estimate; "" if nothing.
+  virtual std::string stability_text(double) const { return {}; }
 
   /// Whether a cell is so near to an outflow that the run should end before another step of that length, and which cell
   /// and where, for messages (all ranks call). Nearer, the end of the grid disturbs the flow; beyond it there is none.
@@ -56,6 +58,13 @@ class Coupling {
   virtual void set_state(const std::vector<double>&) {}
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
+
+  /// How far each body has been moved back by whole periods since the start, um; copies to the host.
+  virtual std::vector<Triple> wrapped_by() const = 0;
+  /// Of the fluid on the cells, nW, where no tractions tell.
+  virtual double power_on_cells() { return 0; }
+  /// Friction beside the membranes that the grid does not show, nW.
+  virtual double unresolved_dissipation() { return 0; }
 
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.

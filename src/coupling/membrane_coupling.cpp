@@ -3,6 +3,7 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "core/units.hpp"
+#include "coupling/force_coupling.hpp"
 #include "immersed/surface_motion.hpp"
 #include "membrane/interface.hpp"
 
@@ -237,6 +238,8 @@ std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& s
   std::unique_ptr<Coupling> coupling;
   if (scene.cells.empty())
     coupling = std::make_unique<SharpCoupling>(scene, fluid, timers, nullptr);
+  else if (scene.coupling->scheme == CouplingSettings::Scheme::force)
+    coupling = std::make_unique<ForceCoupling>(scene, schedule, fluid, timers);
   else if (scene.coupling->scheme == CouplingSettings::Scheme::iterated)
     coupling = std::make_unique<IteratedCoupling>(scene, fluid, timers);
   else

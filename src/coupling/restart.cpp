@@ -157,11 +157,14 @@ void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
   std::vector<double> positions(3 * static_cast<std::size_t>(surfaces.vertices));
   file.read("classified_positions", {positions.size() / 3, 3}, positions.data());
   simulation.immersed()->resume(positions);
-  if (simulation.immersed()->boundary().periodic()) {
-    auto laps = simulation.immersed()->boundary().laps_state();
-    file.read("laps", {laps.size()}, laps.data());
-    simulation.immersed()->boundary().set_laps_state(laps);
-  }
+  if (!simulation.immersed()->boundary().periodic()) return;
+  auto laps = simulation.immersed()->boundary().laps_state();
+  file.read("laps", {laps.size()}, laps.data());
+  simulation.immersed()->boundary().set_laps_state(laps);
+}
+
+void read_coupling(const CheckpointReader& file, FlowSimulation& simulation) {
+  if (simulation.immersed()) read_surfaces(file, simulation);
   // Another scheme than that of the checkpoint starts without a history of its own.
   auto coupling = simulation.coupling()->state();
   if (!coupling.empty() && file.has("coupling") && file.shape("coupling") == Shape{coupling.size()}) {
@@ -187,7 +190,7 @@ Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, co
   std::int64_t levels = 0;
   file.read("numbers", {2}, numbers);
   file.read("history_levels", {1}, &levels);
-  if (simulation.immersed()) read_surfaces(file, simulation);
+  if (simulation.coupling()) read_coupling(file, simulation);
   try {
     simulation.resume({file.header().time_us, numbers[1], file.header().step});
   } catch (const InputError& error) {

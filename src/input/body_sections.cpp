@@ -115,13 +115,33 @@ BodySettings read_body(Section& s) {
   return b;
 }
 
+namespace {
+
+CouplingSettings read_force_coupling(Section& s, CouplingSettings c) {
+  using Kernel = CouplingSettings::Kernel;
+  c.kernel = s.choice<Kernel>("kernel", {{"three-point", Kernel::three_point}, {"four-point", Kernel::four_point}}, c.kernel);
+  c.slip = s.flag("slip", c.slip);
+  for (const char* key : {"tolerance", "max_iterations", "robin_coefficient_pg_per_um2_per_us", "robin_in_iterated",
+                          "robin_in_aitken", "acceleration"})
+    s.unused(key, "scheme = \"force\" has no such key: membranes move with the fluid, and nothing is iterated");
+  s.finish();
+  return c;
+}
+
+}  // namespace
+
 CouplingSettings read_coupling(Section& s) {
   using Scheme = CouplingSettings::Scheme;
   using Acceleration = CouplingSettings::Acceleration;
   CouplingSettings c;
   c.scheme = s.choice<Scheme>(
-      "scheme", {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated}},
+      "scheme",
+      {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated},
+       {"force", Scheme::force}},
       c.scheme);
+  if (c.scheme == Scheme::force) return read_force_coupling(s, c);
+  for (const char* key : {"kernel", "slip"})
+    s.unused(key, "only scheme = \"force\" has this key: with the others membranes cut the grid");
   c.tolerance = s.number("tolerance", between(1e-12, 0.5), c.tolerance);
   c.max_iterations = s.integer("max_iterations", 1, 10000, c.max_iterations);
   const std::string robin = "robin_coefficient_pg_per_um2_per_us";

@@ -8,6 +8,7 @@
 #include "immersed/surface.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/membrane_views.hpp"
+#include "membrane/mobility.hpp"
 #include "membrane/motion.hpp"
 #include "membrane/reference.hpp"
 
@@ -81,6 +82,18 @@ class Membranes {
   int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0,
               const Components<double>& v_star = {});
 
+  /// Begin a step of membranes that move with the fluid: put them where their last velocities bring them in `ahead_us`.
+  void set_out(double ahead_us);
+  /// End it: move all cells by `dt_us`, from where they were, with `share` of their last velocities and the rest of those that
+  /// surfaces().v holds, of the fluid around, once these are projected so that they change no volume. Volumes are V0 then. After
+  /// compute_forces() at the present positions.
+  /// @throws ComputationError  if a position is not finite
+  void drift(double dt_us, double share);
+
+  /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over all types of cells, 1/us.
+  /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
+  double fastest_relaxation_per_us(const MobilityModel& model);
+
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
   void save_state();
   void restore_state();
@@ -110,6 +123,7 @@ class Membranes {
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
+  double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells);
   [[noreturn]] void explain(int cell, double dt);
 
   MembraneViews views_;

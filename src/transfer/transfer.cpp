@@ -1,11 +1,10 @@
 #include "transfer/transfer.hpp"
 
+#include <algorithm>
+
 #include "transfer/delta.hpp"
 #include "transfer/marker_bins.hpp"
-#include "transfer/slip.hpp"
 #include "transfer/transfer_kernels.hpp"
-
-#include <algorithm>
 
 namespace corpuscle {
 
@@ -96,19 +95,19 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   Kokkos::deep_copy(places_.image, -1);
   beyond_host_ = HostCopy(places_.beyond);
   markers_.start = make<Array<int>>("cell_start", cells + 1);
+  markers_.near = make<Array<unsigned char>>("cell_near", cells);
   make_room(vertices);
 }
 
 void Transfer::make_room(int markers) {
   if (markers <= room_) return;
-  room_ = markers + markers / 4;
+  room_ = markers + markers / 10;
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
-  markers_.x = make<Components<double>>("marker_x", room_, 3);
   markers_.vertex = make<Array<int>>("marker_vertex", room_);
   markers_.home = make<Array<unsigned char>>("marker_home", room_);
   markers_.eta = make<Table<double>>("marker_eta", room_, 3);
-  markers_.base = make<Table<int>>("marker_base", room_, 6);
+  markers_.base = make<Table<short>>("marker_base", room_, 6);
   markers_.weight = make<Table<double>>("marker_weight", room_, 6 * points);
   markers_.inverse = make<Table<double>>("marker_inverse", room_, 9);
   markers_.across = make<Table<double>>("marker_across", room_, 3);
@@ -122,7 +121,10 @@ int Transfer::place(const Components<double>& x) {
   make_room(markers_.count);
   fill_markers(search_, x, places_, markers_);
   sort_markers(block_.index(), markers_);
-  with_kernel([&](auto delta) { prepare_markers<decltype(delta)>(block_, markers_); });
+  with_kernel([&](auto delta) {
+    prepare_markers<decltype(delta)>(block_, markers_);
+    mark_near<decltype(delta)>(block_, markers_);
+  });
   const int beyond = beyond_host_.read()(0);
   return beyond < no_vertex ? beyond : -1;
 }
@@ -133,15 +135,18 @@ void Transfer::spread(const Components<double>& force) {
   for (const auto& across : faces_.across) grid_->halo().exchange(across);
 }
 
-void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const Slip* slip,
+void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                            const Components<double>& velocity) {
-  double coefficient = 0;
-  with_kernel([&](auto delta) {
-    interpolate_velocity<decltype(delta)>(block_, flux, u, markers_);
-    coefficient = slip_coefficient<decltype(delta)>;
-  });
-  if (slip) add_slip(block_, coefficient, slip->mu, slip->force, slip->normal, slip->area, slip->chi, markers_);
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, flux, u, markers_); });
+  if (slip) add_slip(block_, *slip, markers_);
   collect_velocity(places_.first, markers_, velocity);
+}
+
+SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
+                         const Array<double>& chi) const {
+  SlipLaw law{};
+  with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
+  return {law, viscosity, force, surface.normal, surface.area, chi};
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }

@@ -3,7 +3,9 @@
 
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
+#include "immersed/surface_views.hpp"
 #include "transfer/find_markers.hpp"
+#include "transfer/slip.hpp"
 
 namespace corpuscle {
 
@@ -21,13 +23,13 @@ class Transfer {
   /// The force on faces, with valid halos: shared with the fluid.
   const FaceForce& faces() const { return faces_; }
   /// Velocity of the vertices [vertex, 3], um/us, from fluxes through faces and velocities on the sides of the block: this
-  /// rank's part, without the slip if `slip` has no value.
-  struct Slip {
-    double mu;
-    Components<double> force, normal;  // [vertex, 3] nN, outward
-    Array<double> area, chi;           // [vertex] um2; 1 for a membrane alone to 0 near others (empty: 1)
-  };
-  void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const Slip* slip, const Components<double>& velocity);
+  /// rank's part.
+  /// @param slip  null for none
+  void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
+                   const Components<double>& velocity);
+  /// What the slip of a membrane depends on, with this kernel's law.
+  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
+                 const Array<double>& chi = {}) const;
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks all of them do.
   int at_home() const;

@@ -1,14 +1,15 @@
-// A closed surface held in place in a fluid at rest at infinity, and given forces on its vertices: what the flow does with them.
+// A closed surface held in place in a fluid at rest at infinity, and given forces on its vertices: what the flow does with
+// them.
 #pragma once
+
+#include <algorithm>
+#include <cmath>
 
 #include "coupling/rigid_bodies.hpp"
 #include "fluid/fluid_solver.hpp"
 #include "immersed/surface.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "transfer/transfer.hpp"
-
-#include <algorithm>
-#include <cmath>
 
 namespace corpuscle::testing {
 
@@ -23,8 +24,8 @@ inline TriangleMesh ellipsoid_mesh(const Triple& semi_axes, const Triple& center
 
 class HeldSurface {
  public:
-  HeldSurface(const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries, const FluidSettings& settings, const TriangleMesh& mesh,
-              CouplingSettings::Kernel kernel)
+  HeldSurface(const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries, const FluidSettings& settings,
+              const TriangleMesh& mesh, CouplingSettings::Kernel kernel)
       : grid(Comm(), nodes, periodic(boundaries)),
         fluid(grid, settings, boundaries),
         surface(make_surface_set({mesh})),
@@ -57,7 +58,10 @@ class HeldSurface {
       fluid.begin_step(dt_us);
       fluid.solve((s + 1) * dt_us, nullptr);
     }
-    const Transfer::Slip correction{fluid.viscosity(), force, surface.normal, surface.area, {}};
+    take_velocity(slip);
+  }
+  void take_velocity(bool slip) {
+    const SlipViews correction = transfer.slip(surface, force, fluid.viscosity());
     transfer.interpolate(fluid.flux(), fluid.velocity(), slip ? &correction : nullptr, velocity);
   }
 

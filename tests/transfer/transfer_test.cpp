@@ -1,10 +1,10 @@
-#include <catch2/catch.hpp>
+#include "transfer/transfer.hpp"
 
+#include <catch2/catch.hpp>
 #include <random>
 
 #include "../fluid/fluid_fixture.hpp"
 #include "transfer/delta.hpp"
-#include "transfer/transfer.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::fluid_test;
@@ -12,7 +12,8 @@ using namespace corpuscle::fluid_test;
 namespace {
 
 using Kernel = CouplingSettings::Kernel;
-const std::array<Type, 6> walls{Type::moving_wall, Type::moving_wall, Type::moving_wall, Type::moving_wall, Type::moving_wall, Type::moving_wall};
+const std::array<Type, 6> walls{Type::moving_wall, Type::moving_wall, Type::moving_wall,
+                                Type::moving_wall, Type::moving_wall, Type::moving_wall};
 
 class Noise {
  public:
@@ -81,7 +82,9 @@ Field make_field(const Grid& grid, const std::function<Triple(const Triple&)>& v
           const int at[3] = {i, j, k};
           Triple centre;
           for (int m = 0; m < 3; ++m)  // beyond a side lies the side itself
-            centre[m] = at[d] == 0 && !index.periodic[d] ? x(low, m) : at[d] == index.n[d] && !index.periodic[d] ? x(c, m) : 0.5 * (x(c, m) + x(low, m));
+            centre[m] = at[d] == 0 && !index.periodic[d]            ? x(low, m)
+                        : at[d] == index.n[d] && !index.periodic[d] ? x(c, m)
+                                                                    : 0.5 * (x(c, m) + x(low, m));
           const Triple value = velocity(centre);
           flux(c) = 0;
           for (int m = 0; m < 3; ++m) flux(c) += area(c, m) * value[m];
@@ -106,7 +109,8 @@ double face_sum(const Transfer& transfer, const std::function<double(int, int)>&
   return sum;
 }
 
-double largest_error(const Components<double>& v, const Components<double>& x, const std::function<Triple(const Triple&)>& velocity) {
+double largest_error(const Components<double>& v, const Components<double>& x,
+                     const std::function<Triple(const Triple&)>& velocity) {
   const auto at = on_host(x), found = on_host(v);
   double worst = 0;
   for (std::size_t i = 0; i < at.extent(0); ++i) {
@@ -179,7 +183,8 @@ TEST_CASE("uniform velocities are exact on any grid and linear ones on straight 
     transfer.interpolate(field.flux, field.u, nullptr, v);
     return largest_error(v, x, velocity);
   };
-  Grid warped(comm, warped_box({9, 8, 10}), {false, false, false}), straight(comm, sheared_box({9, 8, 10}), {false, false, false});
+  Grid warped(comm, warped_box({9, 8, 10}), {false, false, false}),
+      straight(comm, sheared_box({9, 8, 10}), {false, false, false});
   const auto uniform = [](const Triple&) { return Triple{0.3, -1, 0.7}; };
   const auto linear = [](const Triple& p) { return Triple{0.3 + p[1] - 2 * p[2], p[0] - p[1], 0.2 + p[1] + p[2] - 3 * p[0]}; };
   CHECK(error(warped, true, uniform) < 1e-12);
@@ -235,7 +240,9 @@ TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]"
   for (int step = -2; step < index.n[d] + 2; ++step) {
     double s[3] = {0.61, 0.83, 0.37};
     s[d] = 2 * (step + 0.13) / index.n[d];
-    REQUIRE(transfer.place(points(1, [&](int) { return Triple{s[0] + 0.3 * s[1], s[1] + 0.2 * s[2], s[2] + 0.15 * s[0]}; })) == -1);
+    REQUIRE(transfer.place(points(1, [&](int) {
+      return Triple{s[0] + 0.3 * s[1], s[1] + 0.2 * s[2], s[2] + 0.15 * s[0]};
+    })) == -1);
     CHECK(transfer.at_home() == 1);
     transfer.spread(force);
     const auto across = on_host(transfer.faces().across[d]);
@@ -244,7 +251,8 @@ TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]"
       double sum = 0;
       visit_owned(index, [&](int i, int j, int k, int cell) {
         const int at[3] = {i, j, k};
-        if (at[d] == ((c + step) % index.n[d] + index.n[d]) % index.n[d]) sum += across(cell) * (1 + at[(d + 1) % 3] + 10 * at[(d + 2) % 3]);
+        if (at[d] == ((c + step) % index.n[d] + index.n[d]) % index.n[d])
+          sum += across(cell) * (1 + at[(d + 1) % 3] + 10 * at[(d + 2) % 3]);
       });
       line.push_back(sum);
     }
