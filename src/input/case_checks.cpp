@@ -41,7 +41,8 @@ void check_tube_sides(const Case& scene, const Complaint& complain) {
 /// What membranes that are forces do not have yet.
 void check_force_scheme(const Case& scene, const Complaint& complain) {
   if (!scene.bodies.empty())
-    complain("bodies", "", "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
+    complain("bodies", "",
+             "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
   for (std::size_t c = 0; c < scene.cells.size(); ++c)
     if (scene.cells[c].membrane_viscosity_N_s_per_m > 0)
       complain(fmt::format("cells.{}", c), "membrane_viscosity_N_s_per_m",
