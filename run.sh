@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Set up and build if needed, then run a case:
 #
-#   ./run.sh CASE.toml [--out DIR] [--set section.key=value]... [--restart FILE]
+#   ./run.sh CASE.toml [--out DIR] [--overwrite] [--set section.key=value]... [--restart CHECKPOINT] [--estimate-error[=KINDS]]
 #
 # OMP_NUM_THREADS  threads (default: number of cores)
 set -euo pipefail
-here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 case ${1:-} in
   ''|-h|--help) sed -n '2,6s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; [ -n "${1:-}" ] && exit 0 || exit 2 ;;
 esac

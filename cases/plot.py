@@ -28,6 +28,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 
+def fail(message):
+    """One line, and the exit code of input that is wrong."""
+    print(f"plot.py: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
 def open_series(path, name):
     """An HDF5 series and its (time, group) pairs in order of time, or None where the run has none."""
     file = path / name
@@ -39,7 +45,16 @@ def open_series(path, name):
     except OSError as error:
         print(f"plot.py: {file} cannot be read ({error}): left out")
         return None, []
-    times = sorted((float(group.attrs["time_us"]), key) for key, group in data.items() if key.startswith("step_"))
+    times = []
+    for key in data:
+        if not key.startswith("step_"):
+            continue
+        try:
+            times.append((float(data[key].attrs["time_us"]), key))
+        except (KeyError, OSError):
+            link = data.get(key, getlink=True)
+            fail(f"{file}: {key} leads to {getattr(link, 'filename', key)}, which is missing or damaged: copy the folder as a whole")
+    times.sort()
     if not times:
         print(f"plot.py: {name} holds no stored time: left out")
     return data, times
@@ -138,13 +153,25 @@ def read_history(path):
     if not file.exists():
         print(f"plot.py: no history.csv in {path}: left out")
         return None
-    with open(file, newline="") as lines:
-        rows = list(csv.reader(lines))
+    try:
+        with open(file, newline="") as lines:
+            rows = list(csv.reader(lines))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        fail(f"{file}: cannot be read as text: {error}")
     if len(rows) < 2:
         print("plot.py: history.csv holds no sample: left out")
         return None
-    whole = [row for row in rows[1:] if len(row) == len(rows[0])]
-    values = np.array([[float(v) if v else np.nan for v in row] for row in whole])
+    if "time_us" not in rows[0] or "cell" not in rows[0]:
+        fail(f"{file}: its first line is not that of a history: it names no time_us and cell")
+    values = []
+    for number, row in enumerate(rows[1:], 2):
+        if len(row) != len(rows[0]):  # cut off by a kill
+            continue
+        try:
+            values.append([float(v) if v else np.nan for v in row])
+        except ValueError as error:
+            fail(f"{file}, line {number}: {error}")
+    values = np.array(values).reshape(-1, len(rows[0]))
     return {name: values[:, c] for c, name in enumerate(rows[0])}
 
 
@@ -203,7 +230,10 @@ def experiment_of(path):
 
 
 def save(figure, path):
-    figure.savefig(path, dpi=150)
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        fail(f"{path}: cannot be written ({error.strerror}): choose another folder with --out")
     plt.close(figure)
     print(path)
 
@@ -216,11 +246,21 @@ def main():
     path = arguments.run
     out = arguments.out or path
     if not path.is_dir():
-        sys.exit(f"plot.py: there is no folder {path}")
+        fail(f"there is no folder {path}")
     if not any((path / name).exists() for name in ("history.csv", "fields.h5", "cells.h5")):
-        sys.exit(f"plot.py: {path} holds no results: no history.csv, fields.h5 or cells.h5")
-    out.mkdir(parents=True, exist_ok=True)
+        fail(f"{path} holds no results: no history.csv, fields.h5 or cells.h5")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fail(f"--out {out}: cannot be made a folder ({error.strerror})")
+    try:
+        draw(path, out)
+    except (KeyError, OSError, TypeError, ValueError) as error:
+        fail(f"{path}: what it holds is not what a run writes, or is damaged ({type(error).__name__}: {error})")
 
+
+def draw(path, out):
+    """Every picture for which there is something."""
     history = read_history(path)
     stretching = history is not None and "force_pN" in history
     cells, cell_times = open_series(path, "cells.h5")

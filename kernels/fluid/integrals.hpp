@@ -79,6 +79,24 @@ inline double largest_speed(const IndexSpace& index, const Array<NodeKind>& kind
   return std::sqrt(larger(square, 0));
 }
 
+/// Sum over fluid nodes of (mass V inverse)^2 |u - before|^2: how far a change of the velocity over a step leaves a momentum
+/// equation without its viscous part, scaled as momentum_residual() scales residuals.
+inline double inertia_square(const GridViews& grid, const Array<NodeKind>& kind, double mass_over_mu, const Array<float>& inverse,
+                             const Components<double>& u, const Components<double>& before) {
+  const IndexSpace index = grid.index;
+  const auto volume = grid.volume;
+  double sum = 0;
+  reduce_owned("corpuscle::fluid::inertia_square", index,
+               KOKKOS_LAMBDA(int i, int j, int k, double& total) {
+                 const int c = index.cell(i, j, k);
+                 if (kind(c) != NodeKind::fluid) return;
+                 const Vec3 change = (mass_over_mu * volume(c) * inverse(c)) * (load(u, c) - load(before, c));
+                 total += dot(change, change);
+               },
+               Kokkos::Sum<double>(sum));
+  return sum;
+}
+
 /// Sum of squares of a vector field over fluid nodes.
 inline double owned_square(const IndexSpace& index, const Array<NodeKind>& kind, const Components<double>& field) {
   double sum = 0;

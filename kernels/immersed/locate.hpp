@@ -8,7 +8,7 @@ namespace corpuscle {
 
 struct LocateOptions {
   bool warm = false;        // xi holds the positions of an earlier call
-  bool wall[6] = {};        // i_min, i_max, ... : sides whose distance is reported
+  bool guarded[6] = {};    // i_min, i_max, ... : sides whose distance is reported
   bool outflow[6] = {};     // sides whose distance from the first `travellers` vertices is reported
   int travellers = 0;
   Vec3 lower, upper;        // bounds of the lattice in space, with a margin
@@ -120,7 +120,7 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
           for (int side = 0; side < 6; ++side) {
             const bool here = side % 2 == 0 ? lattice.boundary_below[side / 2] : lattice.boundary_above[side / 2];
             const bool leaves = options.outflow[side] && v < options.travellers;
-            if (!here || !owned || !(options.wall[side] || leaves)) continue;
+            if (!here || !owned || !(options.guarded[side] || leaves)) continue;
             const double gap = spacings_to_side(lattice, xi, side), length = leaves ? gap * norm(tangent[side / 2]) : gap;
             Kokkos::atomic_fetch_min(&out.found(leaves ? 3 : 1), pack_key(length > 0 ? length : 0, static_cast<unsigned>(v)));
           }

@@ -274,6 +274,7 @@ struct StencilInput {
   PseudoNormals normals;
   BandViews band;
   NodeViews nodes;
+  Array<std::int8_t> extended;  // [cell] whether an immersed node gets a pressure from fluid nodes, and a boundary node has a given one; halos filled
 };
 
 KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row& row, RowKind kind,
@@ -286,6 +287,14 @@ KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row
     rows.weight(n, k) = k < row.count ? row.weight[k] : 0;
   }
   Kokkos::atomic_fetch_add(&counts(offset + static_cast<int>(kind)), 1);
+}
+
+/// extended = 1 where `given` says that a boundary node's pressure is known.
+inline void mark_known_pressure(const Array<unsigned char>& given, const Array<std::int8_t>& extended) {
+  const auto from = given;
+  const auto to = extended;
+  Kokkos::parallel_for("corpuscle::immersed::known_pressure", Policy(0, static_cast<int>(to.extent(0))),
+                       KOKKOS_LAMBDA(int c) { to(c) = from(c) ? 1 : 0; });
 }
 
 /// Velocity rows and surface points of `count` immersed nodes; counts[0 .. row_kinds) gets the rows of each kind.
@@ -313,7 +322,7 @@ inline void build_velocity_rows(const StencilInput& input, int count, const Sten
 }
 
 /// Pressure rows of `count` immersed nodes (fluid nodes only, no surface value); counts[row_kinds .. 2 row_kinds).
-/// Exact for linear pressures. A row of kind surface_only is empty.
+/// Exact for linear pressures. A row of kind surface_only is empty. Sets input.extended at these nodes.
 inline void build_pressure_rows(const StencilInput& input, int count,
                                 const StencilViews& rows, const Array<int>& counts) {
   const StencilInput in = input;
@@ -325,6 +334,7 @@ inline void build_pressure_rows(const StencilInput& input, int count,
         Row row;
         const RowKind kind = pressure_row(allowed, p, row);
         write_row(out, n, row, kind, counts, row_kinds);
+        in.extended(out.node(n)) = row.count > 0 ? 1 : 0;
       });
 }
 

@@ -165,7 +165,8 @@ KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<dou
   fit.points = 0;
   for_nodes_around(in, t, farthest, [&](int c, const Vec3& y, const Vec3&, double w) {
     const NodeKind kind = in.nodes.kind(c);
-    if (kind != NodeKind::fluid && kind != NodeKind::immersed) return;
+    // In a pocket no fluid is near: what an immersed node there has for a pressure is nobody's. An outflow's is given.
+    if (kind != NodeKind::fluid && !in.extended(c)) return;
     if (fit.points == 0) level = p(c);
     const double phi[4] = {1, y.x, y.y, y.z};
     normal.add(phi, w);

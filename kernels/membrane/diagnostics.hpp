@@ -51,17 +51,18 @@ KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int 
   return sum;
 }
 
-/// @param laws   [type]
+/// The rows of the given cells; measure_membranes must have run.
+/// @param laws   [type], read for those of the cells
+/// @param cells  AllCells or ListedCells
 /// @param table  [cells, CellColumn::count]
-template <class Law>
-void measure_cells(const MembraneViews& m, const Array<Law>& laws, const Table<double>& table) {
-  measure_membranes(m, m.surface.x);
+template <class Law, class Cells>
+void measure_cells(const MembraneViews& m, const Array<Law>& laws, const Cells& cells, const Table<double>& table) {
   using Column = CellColumn;
   const auto x = m.surface.x, v = m.surface.v;
   Kokkos::parallel_for(
-      "corpuscle::membrane::measure_cells", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
+      "corpuscle::membrane::measure_cells", Kokkos::TeamPolicy<Exec>(cells.count, Kokkos::AUTO),
       KOKKOS_LAMBDA(const SectionTeam& team) {
-        const int cell = team.league_rank(), type = m.type(cell);
+        const int cell = cells(team.league_rank()), type = m.type(cell);
         const CellLaw law = m.law(type);
         const Law in_plane = laws(type);
         const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);

@@ -1,22 +1,28 @@
-// The kernels of one in-plane law, behind an interface that does not know which.
+// The kernels of the in-plane laws, behind an interface that does not know which.
 #pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "membrane/diagnostics.hpp"
 #include "membrane/forces.hpp"
 
 namespace corpuscle {
 
-/// What depends on the law of a scene's cells. Made once; a call is one or two launches.
+/// What depends on the laws of a scene's cells. Made once; a call is one launch for each law that the scene has.
 class Elasticity {
  public:
   virtual ~Elasticity() = default;
   /// Forces of each triangle on its corners, into m.corner_force; measure_membranes must have run at the same x. Marks in
   /// m.status the cells that are strained beyond the limit.
   virtual void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const = 0;
+
   /// @param table  [cells, CellColumn::count]
-  virtual void measure_cells(const MembraneViews& m, const Table<double>& table) const = 0;
-  /// Of the strain at which a step is refused.
-  virtual double limit() const = 0;
+  void measure_cells(const MembraneViews& m, const Table<double>& table) const {
+    measure_membranes(m, m.surface.x);
+    fill_rows(m, table);
+  }
 
   /// Internal forces at positions x, into force [vertex, 3] nN.
   void membrane_forces(const MembraneViews& m, const Components<double>& x, const Components<double>& force) const {
@@ -24,24 +30,43 @@ class Elasticity {
     evaluate_triangles(m, x);
     gather_forces(m, force);
   }
+
+  virtual void fill_rows(const MembraneViews& m, const Table<double>& table) const = 0;
 };
 
-template <class Law>
+/// One law for the cells that have it.
+template <class Law, class Cells>
 class ElasticityOf final : public Elasticity {
  public:
-  /// @param laws  [type]
-  explicit ElasticityOf(const Array<Law>& laws) : laws_(laws) {}
+  /// @param laws  [type], those of the cells
+  ElasticityOf(const Array<Law>& laws, const Cells& cells) : laws_(laws), cells_(cells) {}
 
   void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const override {
-    corpuscle::evaluate_triangles(m, laws_, x);
+    corpuscle::evaluate_triangles(m, laws_, cells_, x);
   }
-  void measure_cells(const MembraneViews& m, const Table<double>& table) const override {
-    corpuscle::measure_cells(m, laws_, table);
+  void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
+    corpuscle::measure_cells(m, laws_, cells_, table);
   }
-  double limit() const override { return Law::limit; }
 
  private:
   Array<Law> laws_;
+  Cells cells_;
+};
+
+/// Cells of several laws: each law's in turn.
+class MixedElasticity final : public Elasticity {
+ public:
+  explicit MixedElasticity(std::vector<std::unique_ptr<Elasticity>> parts) : parts_(std::move(parts)) {}
+
+  void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const override {
+    for (const auto& part : parts_) part->evaluate_triangles(m, x);
+  }
+  void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
+    for (const auto& part : parts_) part->fill_rows(m, table);
+  }
+
+ private:
+  std::vector<std::unique_ptr<Elasticity>> parts_;
 };
 
 }  // namespace corpuscle

@@ -37,11 +37,12 @@ inline void measure_membranes(const MembraneViews& m, const Components<double>& 
 
 /// Forces of each triangle on its corners; measure_membranes must have run at the same x. Marks overstrained cells in
 /// m.status.
-/// @param laws  [type]
-template <class Law>
-void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Components<double>& x) {
-  for_sections(
-      "corpuscle::membrane::triangle_forces", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+/// @param laws   [type], read for those of the cells
+/// @param cells  AllCells or ListedCells
+template <class Law, class Cells>
+void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Cells& cells, const Components<double>& x) {
+  for_sections_of(
+      "corpuscle::membrane::triangle_forces", cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
         const SurfaceSet& surface = m.surface;
         const int type = m.type(cell), first = surface.first_triangle(cell);
         const int shift = m.type_first_triangle(type) - first;

@@ -12,18 +12,39 @@ inline constexpr int sections = 16;  // enough parallel work for one small cell,
 
 using SectionTeam = typename Kokkos::TeamPolicy<Exec>::member_type;
 
-template <class Body>
+/// Which cells a kernel is for: all of `count`,
+struct AllCells {
+  int count = 0;
+  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return n; }
+};
+
+/// or those of a list.
+struct ListedCells {
+  Array<int> cells;  // [count]
+  int count = 0;
+  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return cells(n); }
+};
+
+template <class Cells, class Body>
 struct SectionKernel {
+  Cells cells;
   Body body;
   KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
-    body(team, team.league_rank() / sections, team.league_rank() % sections);
+    body(team, cells(team.league_rank() / sections), team.league_rank() % sections);
   }
 };
 
-/// Run body(team, cell, section) for every section of every cell.
+/// Run body(team, cell, section) for every section of the cells.
+template <class Cells, class Body>
+void for_sections_of(const std::string& label, const Cells& cells, const Body& body) {
+  Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells.count * sections, Kokkos::AUTO),
+                       SectionKernel<Cells, Body>{cells, body});
+}
+
+/// Of every cell.
 template <class Body>
 void for_sections(const std::string& label, int cells, const Body& body) {
-  Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells * sections, Kokkos::AUTO), SectionKernel<Body>{body});
+  for_sections_of(label, AllCells{cells}, body);
 }
 
 /// The part of [first, last) that belongs to a section, shared out over the team.

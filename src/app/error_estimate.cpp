@@ -2,9 +2,11 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "coupling/step_schedule.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 #include <string_view>
 
@@ -12,7 +14,8 @@ namespace corpuscle {
 
 namespace {
 
-constexpr int fewest_vertices = 200;  // of a built-in mesh
+/// Of the cell's built-in mesh.
+int fewest_vertices(const CellSettings& cell) { return cell.shape == CellSettings::Shape::biconcave ? 200 : 42; }
 
 [[noreturn]] void refuse(std::string_view kind, std::string_view why) {
   throw InputError(fmt::format("--estimate-error={}: {}", kind, why));
@@ -37,6 +40,7 @@ CoarserRun doubled_spacing(const Case& scene) {
 
 CoarserRun longer_step(const Case& scene) {
   if (!scene.fluid) refuse("step", "this scene has no time; use --estimate-error=vertices");
+  const StepSchedule countable(scene.time);
   const long steps = std::lround(scene.time.end_us / scene.time.step_us);
   long ratio = 2;
   while (ratio <= steps && steps % ratio != 0) ++ratio;
@@ -51,14 +55,15 @@ CoarserRun longer_step(const Case& scene) {
 CoarserRun fewer_vertices(const Case& scene) {
   if (scene.cells.empty()) refuse("vertices", "this scene has no [[cells]]; use --estimate-error=spacing,step");
   CoarserRun run{"vertices", std::sqrt(2.0), {}};
+  std::set<std::string> coarsened;  // cells of one type share a key
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const auto& cell = scene.cells[c];
     if (!cell.mesh.empty()) refuse("vertices", fmt::format("cells.{} comes from a file and cannot be coarsened", c));
-    const int vertices = std::max(cell.vertices / 2, fewest_vertices);
-    if (vertices >= cell.vertices)
-      refuse("vertices", fmt::format("cells.{}.vertices = {}: no mesh is coarser; raise it", c, cell.vertices));
+    const std::string key = cell.type < 0 ? fmt::format("cells.{}.vertices", c) : constant_key(cell, "vertices");
+    const int vertices = std::max(cell.vertices / 2, fewest_vertices(cell));
+    if (vertices >= cell.vertices) refuse("vertices", fmt::format("{} = {}: no mesh is coarser; raise it", key, cell.vertices));
     run.ratio = std::min(run.ratio, std::sqrt(double(cell.vertices) / vertices));
-    run.overrides.push_back(fmt::format("cells.{}.vertices={}", c, vertices));
+    if (coarsened.insert(key).second) run.overrides.push_back(fmt::format("{}={}", key, vertices));
   }
   return run;
 }
@@ -71,7 +76,7 @@ std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds
     if (scene.grid && scene.grid->generator != GridSettings::Generator::file) runs.push_back(doubled_spacing(scene));
     if (scene.fluid) runs.push_back(longer_step(scene));
     const bool coarser_meshes = std::all_of(scene.cells.begin(), scene.cells.end(), [](const CellSettings& cell) {
-      return cell.mesh.empty() && cell.vertices > fewest_vertices;
+      return cell.mesh.empty() && cell.vertices > fewest_vertices(cell);
     });
     if (!scene.cells.empty() && coarser_meshes) runs.push_back(fewer_vertices(scene));
     if (runs.empty()) refuse("all", "nothing of this scene can be coarsened");
@@ -79,6 +84,7 @@ std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds
   }
   std::stringstream list(kinds);
   for (std::string kind; std::getline(list, kind, ',');) {
+    if (std::any_of(runs.begin(), runs.end(), [&](const CoarserRun& run) { return run.kind == kind; })) continue;
     if (kind == "spacing") {
       runs.push_back(doubled_spacing(scene));
     } else if (kind == "step") {

@@ -17,7 +17,8 @@ struct CoarserRun {
 };
 
 /// @param kinds  comma-separated: "spacing" (of the grid, doubled), "step" (doubled, or the next multiple that divides
-///               the run), "vertices" (half as many on each cell); "all" takes those that the scene has
+///               the run), "vertices" (half as many on each cell); "all" takes those that the scene has;
+///               one that is named twice counts once
 /// @throws InputError  for a kind that does not exist or that the scene does not have
 std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds);
 

@@ -47,6 +47,20 @@ double memory_at_hand_mb();
 /// @throws InputError  on every rank, with the figures
 MemoryEstimate require_memory(const Comm& comm, const Case& scene);
 
+/// What the time of a run depends on, beyond how long its set-up takes.
+struct RunSize {
+  double cells = 0;     // of the grid
+  bool skewed = false;
+  double vertices = 0;  // of all surfaces
+  double membrane_vertices = 0, substeps = 1;
+  double steps = 0, cores = 1;
+};
+
+/// Of a scene's set-up, most of which goes into meshes, on one core, s.
+double estimate_set_up_s(double vertices);
+/// Of all steps, s: within a factor of two or so, of which grid, surfaces and cores account for as much each.
+double estimate_steps_s(const RunSize& size);
+
 /// One line of the screen.
 std::string memory_text(const MemoryEstimate& estimate, int ranks);
 

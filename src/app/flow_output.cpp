@@ -42,26 +42,26 @@ double poor_share(const std::vector<long>& fits) {
 
 }  // namespace
 
-FlowOutput::FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
                        std::optional<double> restart_us, std::chrono::steady_clock::time_point start)
-    : folder_(folder), scene_(scene), simulation_(simulation), timers_(timers), restart_us_(restart_us), start_(start),
-      energy_(simulation) {
+    : folder_(place.folder), run_(place.run), files_(place.files), scene_(scene), simulation_(simulation), timers_(timers),
+      restart_us_(restart_us), start_(start), energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
   columns.bodies = simulation.rigid_bodies() != nullptr;
   if (columns.cells) columns.more = shape_columns;
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
-  if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
+  if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
 #ifdef CORPUSCLE_HDF5
   if (scene.output.fields)
-    fields_ = std::make_unique<FieldWriter>(folder, comm, simulation.grid().index(),
+    fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
                                             simulation.grid().owned_nodes().data(), restart_us);
   if (scene.output.cells && simulation.surfaces()) {
     const auto& set = *simulation.surfaces();
     const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
     const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
-    cells_ = std::make_unique<CellWriter>(folder, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
+    cells_ = std::make_unique<CellWriter>(folder_, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
   }
 #endif
   if (!simulation.membranes()) return;
@@ -79,11 +79,28 @@ bool FlowOutput::due(double every_us) const {
   return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
 }
 
+/// Figures that cost a share of a step are taken, whatever the run stores, at the first steps, where most flows change fastest,
+/// at every eighth, and at the last: that one counts for this run's report alone, since a run that goes on from here would not
+/// have it.
+void FlowOutput::sample_flow() {
+  constexpr long first = 8, every = 8;
+  const long step = simulation_.steps();
+  const bool regular = step <= first || step % every == 0;
+  if (!regular && !simulation_.done() && !simulation_.at_outflow()) return;
+  const FlowSample sample{simulation_.time(), simulation_.fluid().splitting(),
+                          simulation_.immersed() ? simulation_.immersed()->slip()[1] : 0.0};
+  if (regular)
+    totals_.add(sample);
+  else
+    end_sample_ = sample;
+}
+
 void FlowOutput::gather() {
   const auto& fluid = simulation_.fluid().statistics();
   totals_.momentum.add(fluid.momentum_iterations);
   totals_.pressure.add(fluid.pressure_iterations);
   totals_.projections.add(fluid.projections);
+  totals_.speed = larger(totals_.speed, fluid.speed);
   const double spacing = simulation_.grid().mean_spacing();
   if (fluid.reference_speed > 0)
     totals_.divergence = larger(totals_.divergence, fluid.divergence / (fluid.reference_speed * spacing * spacing));
@@ -102,7 +119,7 @@ void FlowOutput::after_step(bool start) {
     if (history_) write_history();
     energy_.sample(elastic_energy_);
   }
-  if (!start && due(output.every_us)) totals_.splitting = larger(totals_.splitting, simulation_.fluid().splitting());
+  if (!start) sample_flow();
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -113,6 +130,9 @@ void FlowOutput::after_step(bool start) {
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   for (std::size_t c = 0; c < cells.size(); ++c) {
     totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
+    const CellSettings& settings = scene_.cells[c];
+    // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
+    if (settings.law != CellSettings::Law::wlc_pow && settings.area_modulus_uN_per_m == 0) continue;
     const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
     totals_.area_drift = larger(totals_.area_drift, drift);
     if (!(drift <= senseless_area))
@@ -121,8 +141,10 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
           "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
           "tell (grid.nodes); reduce the flow "
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
-          "cells.{}.area_modulus_uN_per_m",
-          c, 100 * drift, 100 * lysis_area, c));
+          "{}",
+          c, 100 * drift, 100 * lysis_area,
+          settings.type < 0 ? fmt::format("cells.{}.area_modulus_uN_per_m", c)
+                            : constant_key(settings, "area_modulus_uN_per_m")));
   }
 }
 
@@ -218,11 +240,7 @@ void FlowOutput::write_fields() {
 
 void FlowOutput::write_cells() {
   if (!simulation_.surfaces()) return;
-  if (simulation_.steps() > 0) {
-    simulation_.coupling()->tractions_for_output();
-    const double speed = std::max(simulation_.fluid().statistics().reference_speed, 1e-30);
-    if (simulation_.immersed()) totals_.slip = larger(totals_.slip, simulation_.immersed()->slip()[1] / speed);
-  }
+  if (simulation_.steps() > 0) simulation_.coupling()->tractions_for_output();  // for traction_fallbacks as well
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;
   const auto& set = *simulation_.surfaces();
@@ -238,7 +256,7 @@ void FlowOutput::write_checkpoint_now() {
   const std::string path = folder_ + "/checkpoint.h5";
   std::string totals = to_text(totals_now());
   simulation_.grid().comm().broadcast(totals);
-  write_checkpoint(path, simulation_, scene_.resolved, totals);
+  write_checkpoint(path, simulation_, {scene_.resolved, files_, run_, totals});
   last_checkpoint_ = path;
 #endif
 }
@@ -308,13 +326,16 @@ void FlowOutput::fill_quantities(Report& report) const {
   if (energy_.driving_pressure_kPa() > 0) all["driving_pressure_Pa"] = 1e3 * energy_.driving_pressure_kPa();
 }
 
-void FlowOutput::fill_totals(Report& report, const RunTotals& now) const {
+void FlowOutput::fill_totals(Report& report, RunTotals now) const {
+  if (end_sample_) now.add(*end_sample_);
   auto& errors = report.errors;
   errors["max_divergence"] = now.divergence;
   errors["flux_correction"] = now.flux_correction;
-  errors["splitting"] = now.splitting;
+  errors["splitting"] = now.splitting_until_us > 0 ? now.splitting_us / now.splitting_until_us : 0.0;
+  errors["splitting_max"] = now.splitting_max;
   if (simulation_.immersed()) {
-    errors["slip"] = now.slip;
+    // Of the flow's own speed, prescribed or computed: the solvers' reference may be that of a membrane's return to its shape.
+    errors["slip"] = now.slip_speed / std::max({simulation_.fluid().boundaries().largest_speed(), now.speed, 1e-30});
     const auto& search = now.immersed;
     report.extra["immersed"] = {{"classifications", search.classifications},
                                 {"immersed_nodes", search.immersed},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/run_totals.hpp"
+#include "app/scene_runs.hpp"
 #include "coupling/energy_balance.hpp"
 #include "output/cell_writer.hpp"
 #include "output/field_writer.hpp"
@@ -18,7 +19,7 @@ class FlowOutput {
  public:
   /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
   /// @param start       when the program began this run
-  FlowOutput(const std::string& folder, const Case& scene, FlowSimulation& simulation, Timers& timers,
+  FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
              std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
@@ -42,12 +43,13 @@ class FlowOutput {
 
  private:
   bool due(double every_us) const;
+  void sample_flow();
   void gather();
   void write_history();
   void measure();
   void measure_bodies();
   void write_checkpoint_now();
-  void fill_totals(Report& report, const RunTotals& now) const;
+  void fill_totals(Report& report, RunTotals now) const;
   void write_fields();
   void write_cells();
   RunTotals totals_now(bool together = true);
@@ -57,7 +59,7 @@ class FlowOutput {
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
 
-  std::string folder_;
+  std::string folder_, run_, files_;
   Case scene_;
   FlowSimulation& simulation_;
   Timers& timers_;
@@ -70,6 +72,7 @@ class FlowOutput {
   std::string last_checkpoint_;
   std::vector<double> first_area_, first_volume_;
   RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
+  std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
   std::chrono::steady_clock::time_point start_;
   EnergyBalance energy_;
   std::vector<HistorySample> last_;  // of every cell and body, at the last history sample

@@ -30,6 +30,28 @@ RunTotals totals_of(const std::string& path, const Restored& restored) {
 }
 #endif
 
+#ifdef CORPUSCLE_HDF5
+/// Results that begin with the restart, since what was before is not in the folder.
+void tell_missing(const Case& scene, const std::string& checkpoint, const std::string& folder, FlowSimulation& simulation) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> missing;
+  const auto expect = [&](bool written, const char* name) {
+    if (written && !fs::exists(fs::path(folder) / name)) missing.emplace_back(name);
+  };
+  expect(simulation.coupling() != nullptr, "history.csv");
+  expect(scene.output.fields, "fields.h5");
+  expect(scene.output.cells && simulation.surfaces(), "cells.h5");
+  if (missing.empty()) return;
+  std::error_code ignored;
+  const auto text = fmt::format("{} in {} begin{} at {:.6g} us", fmt::join(missing, ", "), folder, missing.size() == 1 ? "s" : "",
+                                simulation.time());
+  if (fs::equivalent(folder, fs::absolute(checkpoint, ignored).parent_path(), ignored))
+    warn("{}: what was before is not there", text);
+  else
+    info("{}", text);
+}
+#endif
+
 void print_coupling(FlowSimulation& simulation) {
   if (!simulation.membranes()) return;
   const double dt = simulation.next_step_us();
@@ -45,10 +67,11 @@ void print_coupling(FlowSimulation& simulation) {
 }
 
 /// @return what the report has counted until the checkpoint; none without a restart
-std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoint, FlowSimulation& simulation) {
+std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoint, const Place& place,
+                                 FlowSimulation& simulation) {
   if (checkpoint.empty()) return std::nullopt;
 #ifdef CORPUSCLE_HDF5
-  const Restored restored = read_checkpoint(checkpoint, simulation, scene.resolved);
+  const Restored restored = read_checkpoint(checkpoint, simulation, scene.resolved, place.files);
   const auto totals = totals_of(checkpoint, restored);
   info("continuing from {:.6g} us", simulation.time());
   for (const auto& change : restored.changes)
@@ -56,9 +79,14 @@ std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoin
   if (simulation.done())
     throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint,
                                  simulation.time()));
+  if (simulation.at_outflow())
+    throw InputError(fmt::format("{}: {}; to go on, lower time.stop_before_outflow_um, which is {:g} (the least is the way of "
+                                 "two steps)",
+                                 checkpoint, simulation.outflow_message(), scene.time.stop_before_outflow_um));
+  tell_missing(scene, checkpoint, place.folder, simulation);
   return totals;
 #else
-  (void)scene, (void)simulation;
+  (void)scene, (void)place, (void)simulation;
   throw InputError("--restart: this build has no HDF5, so it has no checkpoints; configure with -DCORPUSCLE_HDF5=ON");
 #endif
 }
@@ -131,14 +159,14 @@ Ending run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   FlowSimulation simulation(comm, scene, timers);
   print_schedule(simulation.schedule());
   print_coupling(simulation);
-  const auto totals = restart(scene, options.restart, simulation);
+  const auto totals = restart(scene, options.restart, place, simulation);
   place.begin();
   Ending ending{exit_done, start_report(comm, scene)};
   Report& report = ending.report;
   std::unique_ptr<FlowOutput> output;
   Progress progress(scene.time.end_us, simulation.steps_left());
   try {
-    output = std::make_unique<FlowOutput>(place.folder, scene, simulation, timers,
+    output = std::make_unique<FlowOutput>(place, scene, simulation, timers,
                                           totals ? std::optional(simulation.time()) : std::nullopt, start);
     if (totals) {
       on_root(comm, [&] { std::filesystem::remove(place.folder + "/report.json"); });  // of the run until the checkpoint

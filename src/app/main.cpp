@@ -3,12 +3,18 @@
 #include "app/waiting.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "core/nearest.hpp"
 #include "input/case.hpp"
+#include "input/case_file.hpp"
+#include "input/key_list.hpp"
 #include "output/report.hpp"
 
 #include <CLI/CLI.hpp>
 #include <Kokkos_Core.hpp>
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -78,11 +84,32 @@ void share_cores(const Comm& comm) {
 }
 
 struct Command {
-  enum class Kind { run, check, mesh } kind = Kind::run;
+  enum class Kind { run, check, mesh, keys } kind = Kind::run;
   RunOptions options;
   int vertices = 0;
   std::string mesh_path;
+  std::string section;
 };
+
+/// @throws CLI::ParseError  the first word is none of the program's commands
+void check_command(const CLI::App& app, const std::string& word) {
+  if (word.empty() || word[0] == '-') return;
+  std::vector<std::string> known;
+  for (const auto* command : app.get_subcommands(nullptr)) known.push_back(command->get_name());
+  if (std::find(known.begin(), known.end(), word) != known.end()) return;
+  const auto like = nearest(word, known);
+  throw CLI::ValidationError(word, like.empty() ? fmt::format("there is no such command; known: {}", fmt::join(known, ", "))
+                                                : fmt::format("there is no such command; did you mean '{}'?", like));
+}
+
+/// @throws CLI::ParseError  an option has an empty value, as from a shell variable that is not set: left out, it would mean
+///                          something else
+void check_values(const CLI::App& command) {
+  for (const auto* option : command.get_options())
+    for (const auto& value : option->results())
+      if (value.empty() && option->get_name() != "--set")
+        throw CLI::ValidationError(option->get_name(), "its value is empty: name one, or leave the option out");
+}
 
 /// @throws CLI::ParseError  for what is not a command line of this program, and for --help and --version
 Command parse(CLI::App& app, int argc, char** argv) {
@@ -93,9 +120,9 @@ Command parse(CLI::App& app, int argc, char** argv) {
   auto* run = app.add_subcommand("run", "run a case to its end");
   run->add_option("case", options.case_path, "case file (TOML)")->required();
   run->add_option("--out", options.folder, "folder for the results (default: runs/<case>-001 or the first number that is free, with runs/latest leading to it)");
-  run->add_flag("--overwrite", options.overwrite, "write over the results that the folder of --out holds");
+  run->add_flag("--overwrite", options.overwrite, "remove the results that the folder of --out holds");
   run->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
-  run->add_option("--restart", options.restart, "checkpoint.h5 to continue from");
+  run->add_option("--restart", options.restart, "checkpoint.h5 to continue from, or the folder that holds it");
   run->add_flag("--estimate-error{all}", options.estimate,
                 "error bars from further, coarser runs: spacing, step, vertices (comma-separated), or all");
   run->footer(ends);
@@ -107,24 +134,31 @@ Command parse(CLI::App& app, int argc, char** argv) {
   mesh->add_option("--vertices", command.vertices, "how many vertices, 200 to 30000")->required();
   mesh->add_option("-o,--output", command.mesh_path, "file to write (.off or .stl)")->required();
 
+  auto* keys = app.add_subcommand("keys", "list every section and key of a case file, with defaults and what is allowed");
+  keys->add_option("section", command.section, "only this one: time, grid, fluid, boundary, cells, ...");
+
   std::vector<std::string> words;  // last first, as the parser wants them; Kokkos takes its own options
   for (int n = argc - 1; n > 0; --n)
     if (std::string(argv[n]).rfind("--kokkos-", 0) != 0) words.push_back(argv[n]);
+  if (!words.empty()) check_command(app, words.back());
   app.parse(words);
-  command.kind = *run ? Command::Kind::run : (*check ? Command::Kind::check : Command::Kind::mesh);
+  for (const auto* used : app.get_subcommands()) check_values(*used);
+  command.kind = *run ? Command::Kind::run : *check ? Command::Kind::check : *mesh ? Command::Kind::mesh : Command::Kind::keys;
   return command;
 }
 
 #ifdef CORPUSCLE_MPI
 /// Whether a process that starts alone gets by without message passing, whose start-up takes longer than many a
-/// stretching test. A launcher has set one of these variables for each of its processes.
-bool can_stay_alone(const Command& command) {
+/// stretching test. Keeps the case's text. A launcher has set one of these variables for each of its processes.
+bool can_stay_alone(Command& command) {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID",
                            "PALS_RANKID", "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
     if (std::getenv(name)) return false;
-  if (command.kind == Command::Kind::mesh) return true;
+  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys) return true;
   try {
-    return read_case(command.options.case_path, command.options.overrides).stretching.has_value();
+    const auto file = load_case_file(command.options.case_path);
+    command.options.case_text = file.text;
+    return read_case(file, command.options.overrides).stretching.has_value();
   } catch (const InputError&) {
     return true;  // all there is to do is to say so
   }
@@ -137,6 +171,7 @@ int execute(const Comm& comm, const Command& command) {
       case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
       case Command::Kind::check: check_case(comm, command.options); break;
       case Command::Kind::mesh: write_mesh(command.vertices, command.mesh_path); break;
+      case Command::Kind::keys: info("{}", keys_text(command.section)); break;
     }
     return static_cast<int>(exit_done);
   });
@@ -146,6 +181,7 @@ int execute(const Comm& comm, const Command& command) {
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a failed write, with a message
+  std::signal(SIGPIPE, SIG_IGN);  // a run goes on when nobody reads what it says
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
   wait_briefly(argv);
   CLI::App app{"Red blood cells in flowing plasma", "corpuscle"};

@@ -4,6 +4,7 @@
 #include "core/exit_code.hpp"
 #include "parallel/comm.hpp"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,10 +12,11 @@ namespace corpuscle {
 
 struct RunOptions {
   std::string case_path;
+  std::optional<std::string> case_text;  // where it has been read already: from a pipe it comes only once
   std::string folder;                  // empty: runs/<name of the case file>-001, or the first number that is free
   bool overwrite = false;              // results that the folder holds
   std::vector<std::string> overrides;  // section.key=value
-  std::string restart;                 // checkpoint to continue from; empty: from the start
+  std::string restart;                 // checkpoint to continue from, or its folder; empty: from the start
   std::string estimate;                // coarser runs for error bars (error_estimate.hpp); empty: none
 };
 

@@ -1,5 +1,6 @@
 #include "app/run_totals.hpp"
 
+#include "common/extremes.hpp"
 #include "core/error.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +16,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyTotals, boundaries, gradient, dissipati
                                    membrane_dissipation, membrane_kinetic)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, driving_pressure, time, samples)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
-                                   volume_drift, area_drift, slip, splitting, immersed, energy, wall_s, wall_s_by_part)
+                                   volume_drift, area_drift, speed, slip_speed, splitting_us,
+                                   splitting_until_us, splitting_max, immersed, energy, wall_s, wall_s_by_part)
 
 namespace {
 
@@ -27,6 +29,13 @@ void read_nulls(nlohmann::json& value) {
 }
 
 }  // namespace
+
+void RunTotals::add(const FlowSample& sample) {
+  splitting_us += sample.splitting * (sample.time_us - splitting_until_us);
+  splitting_until_us = sample.time_us;
+  splitting_max = larger(splitting_max, sample.splitting);
+  slip_speed = larger(slip_speed, sample.slip_speed);
+}
 
 std::string to_text(const RunTotals& totals) { return nlohmann::json(totals).dump(); }
 

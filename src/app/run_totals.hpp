@@ -9,14 +9,24 @@
 
 namespace corpuscle {
 
+/// Figures of one step that are not taken after each.
+struct FlowSample {
+  double time_us = 0, splitting = 0, slip_speed = 0;  // slip in um/us
+};
+
 struct RunTotals {
   Tally momentum, pressure, projections, coupling, substeps, residual;
-  double divergence = 0, flux_correction = 0, volume_drift = 0, area_drift = 0, slip = 0;
-  double splitting = 0;  // largest at the times of fields and cells
+  double divergence = 0, flux_correction = 0, volume_drift = 0, area_drift = 0;
+  double splitting_us = 0, splitting_until_us = 0, splitting_max = 0;  // integral over time until then, from the sampled steps
+  double speed = 0;                                                    // um/us, the largest at a node so far
+  double slip_speed = 0;                                               // um/us, the largest of the sampled steps
   ImmersedReport immersed;
   EnergyBalance::State energy;
   double wall_s = 0;                             // of the runs before this one, and of each part
   std::map<std::string, double> wall_s_by_part;
+
+  /// A sample stands for the time since the one before it.
+  void add(const FlowSample& sample);
 };
 
 /// As text for a checkpoint: every number with all its digits.

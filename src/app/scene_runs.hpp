@@ -9,10 +9,12 @@
 
 namespace corpuscle {
 
-/// Where a run puts its results, and what to do there once it is sure to begin.
+/// Where a run puts its results, what to do there once it is sure to begin, and what its checkpoints say of it.
 struct Place {
   std::string folder;
   std::function<void()> begin;
+  std::string run;    // its name, see RunFolder
+  std::string files;  // see fingerprint_files()
 };
 
 /// How a run has ended, other than by an error.

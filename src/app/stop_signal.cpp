@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <csignal>
 #include <ctime>
+#include <iterator>
+#include <tuple>
 #include <utility>
 
 namespace corpuscle {
@@ -35,16 +37,18 @@ void take(int signal) {
 
 StopSignal::StopSignal(const Comm& comm) : comm_(comm) {
   pending = 0;
-  for (const auto& [signal, name] : taken) {
+  static_assert(std::size(taken) == std::tuple_size_v<decltype(before_)>);
+  for (std::size_t n = 0; n < before_.size(); ++n) {
     struct sigaction action {};
     action.sa_handler = take;
     action.sa_flags = SA_RESTART;  // reads and writes of results go on
-    sigaction(signal, &action, nullptr);
+    sigaction(taken[n].first, nullptr, &before_[n]);
+    if (before_[n].sa_handler != SIG_IGN) sigaction(taken[n].first, &action, nullptr);
   }
 }
 
 StopSignal::~StopSignal() {
-  for (const auto& [signal, name] : taken) std::signal(signal, SIG_DFL);
+  for (std::size_t n = 0; n < before_.size(); ++n) sigaction(taken[n].first, &before_[n], nullptr);
 }
 
 std::string StopSignal::asked() {

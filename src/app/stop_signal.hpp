@@ -3,13 +3,17 @@
 
 #include "parallel/comm.hpp"
 
+#include <signal.h>
+
+#include <array>
 #include <chrono>
 #include <string>
 
 namespace corpuscle {
 
-/// Takes SIGTERM, SIGINT, SIGHUP and SIGUSR1 (which mpirun hands on without killing) while it lives. A second one, a
-/// second or more after the first, ends the process at once.
+/// Takes SIGTERM, SIGINT, SIGHUP and SIGUSR1 (which mpirun hands on without killing) while it lives, but not those that the
+/// process was started to ignore (nohup, a script's background job). A second one, a second or more after the first, ends
+/// the process at once.
 class StopSignal {
  public:
   explicit StopSignal(const Comm& comm);
@@ -26,6 +30,7 @@ class StopSignal {
   Comm comm_;
   Clock::time_point last_ = Clock::now();
   long calls_ = 0, interval_ = 1;
+  std::array<struct sigaction, 4> before_{};
 };
 
 }  // namespace corpuscle

@@ -44,17 +44,20 @@ void fill(Report& report, const Case& scene, const StretchingResult& result) {
   report.extra["rest_shape"] = {{"diameter_um", result.rest.diameter_um},
                                 {"thickness_center_um", result.rest.thickness_center_um},
                                 {"thickness_max_um", result.rest.thickness_max_um}};
-  auto judged = report.errors;
-  judged.erase("volume_drift");  // the volume is held by a modulus here, not by the flow around
-  report.warnings = judge(judged, {});
   report.extra["patch_vertices"] = result.patch_vertices;
   if (!scene.stretching->experiment.empty()) {
     const auto comparison = compare(result, read_experiment(scene.stretching->experiment));
-    report.errors["experiment_axial_rms_um"] = comparison.rms_axial_um;
-    report.errors["experiment_transverse_rms_um"] = comparison.rms_transverse_um;
-    report.errors["experiment_points_inside_bars"] = comparison.inside_both;
     report.errors["experiment_points"] = comparison.points;
+    if (comparison.points > 0) {
+      report.errors["experiment_axial_rms_um"] = comparison.rms_axial_um;
+      report.errors["experiment_transverse_rms_um"] = comparison.rms_transverse_um;
+      report.errors["experiment_points_inside_bars"] = comparison.inside_both;
+      report.errors["experiment_interpolation_um"] = comparison.interpolation_um;
+    }
   }
+  FigureScales scales;
+  scales.stretching = true;
+  report.warnings = judge(report.errors, scales);
   report.quantities = {{"axial_um", last.axial_um},
                        {"transverse_um", last.transverse_um},
                        {"rest_diameter_um", result.rest.diameter_um},

@@ -3,6 +3,7 @@
 #include "core/log.hpp"
 #include "membrane/surface_file.hpp"
 
+#include <algorithm>
 #include <set>
 #include <tuple>
 
@@ -24,14 +25,50 @@ void print_surface(const std::string& name, const std::string& path, const FileS
   for (const auto& warning : s.warnings) warn("{}: {}", name, warning);
 }
 
+std::string shape_text(const CellSettings& c) {
+  if (!c.mesh.empty()) return c.mesh;
+  switch (c.shape) {
+    case CellSettings::Shape::sphere:
+      return fmt::format("{} vertices, a sphere of radius {:g} um{}", c.vertices, c.radius_um,
+                         c.inflation > 0 ? fmt::format(" inflated by {:g} %", 100 * c.inflation) : "");
+    case CellSettings::Shape::ellipsoid:
+      return fmt::format("{} vertices, an ellipsoid of semi-axes {:g} x {:g} x {:g} um", c.vertices, c.semi_axes_um[0],
+                         c.semi_axes_um[1], c.semi_axes_um[2]);
+    default: return fmt::format("{} vertices, biconcave, {:g} um wide", c.vertices, c.diameter_um);
+  }
+}
+
+std::string law_text(const CellSettings& c) {
+  switch (c.law) {
+    case CellSettings::Law::neo_hookean: return "neo-hookean";
+    case CellSettings::Law::skalak: return fmt::format("skalak, C = {:g}", c.skalak_c);
+    default: return "wlc-pow";
+  }
+}
+
+std::string cells_text(long count) { return count == 1 ? "1 cell" : fmt::format("{} cells", count); }
+
 }  // namespace
+
+void print_cell_types(const Case& scene) {
+  const auto count = [&](int type) {
+    return std::count_if(scene.cells.begin(), scene.cells.end(), [&](const CellSettings& c) { return c.type == type; });
+  };
+  for (std::size_t k = 0; k < scene.cell_types.size(); ++k) {
+    const auto& [name, cell] = scene.cell_types[k];
+    info("cell type \"{}\": {}; {}, shear modulus {:g} uN/m; {}", name, shape_text(cell), law_text(cell),
+         cell.shear_modulus_uN_per_m, cells_text(count(int(k))));
+  }
+  if (!scene.cell_types.empty() && count(-1) > 0) info("cells with keys of their own: {}", count(-1));
+}
 
 void print_surfaces(const Case& scene) {
   std::set<std::tuple<std::string, double, bool, bool>> cells, bodies;
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const auto& cell = scene.cells[c];
     if (!cell.mesh.empty() && cells.emplace(cell.mesh, cell.scale, cell.recenter, cell.align).second)
-      print_surface(fmt::format("cells.{}", c), cell.mesh, read_cell_surface(cell), true);
+      print_surface(cell.type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", cell.type), cell.mesh,
+                    read_cell_surface(cell), true);
   }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const auto& body = scene.bodies[b];

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace corpuscle {
 namespace {
@@ -13,6 +14,7 @@ namespace {
 struct LogState {
   bool root = true, quiet = false;
   bool line_open = false;  // a progress line without its end
+  bool unheard = false;    // stdout is gone
   spdlog::logger out{"out", std::make_shared<spdlog::sinks::stdout_sink_mt>()};
   spdlog::logger err{"err", std::make_shared<spdlog::sinks::stderr_sink_mt>()};
 
@@ -51,6 +53,8 @@ void log_info(const std::string& message) {
   if (!log.root || log.quiet) return;
   log.close_line();
   log.out.info(message);
+  if (std::ferror(stdout) && !std::exchange(log.unheard, true))
+    log_warning("what the program says can no longer be written (stdout): it goes on");
 }
 
 void log_warning(const std::string& message) {
@@ -87,7 +91,7 @@ void Progress::update(long step, double time_us) {
   shown_step_ = step;
   const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0);
   if (terminal_) {
-    fmt::print("\r{:<78}", text);
+    std::fputs(fmt::format("\r{:<78}", text).c_str(), stdout);  // a terminal that is gone stops no run
     std::fflush(stdout);
     log.line_open = true;
   } else {

@@ -52,10 +52,14 @@ class Coupling {
   /// and where, for messages (all ranks call). Nearer, the end of the grid disturbs the flow; beyond it there is none.
   virtual bool at_outflow(double) const { return false; }
   virtual std::string nearest_outflow() const { return ""; }
+  /// The limit that at_outflow() asks for, and what sets it.
+  virtual std::string outflow_limit(double) const { return ""; }
 
   /// What the next step depends on beyond the flow and the bodies' positions and velocities, for restarts.
   virtual std::vector<double> state() const { return {}; }
   virtual void set_state(const std::vector<double>&) {}
+  /// A checkpoint's state is in place, whose last step ended at `time_us`.
+  virtual void resume(double /*time_us*/) {}
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
 
@@ -73,6 +77,10 @@ class Coupling {
   /// The search and the flow at surfaces that cut the grid; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
 };
+
+/// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to
+/// its shape. Tolerances relative to the speed of a flow at rest would ask for less than round-off.
+double negligible_speed(const Case& scene, double viscosity);
 
 /// The coupling that a case with cells or bodies asks for.
 /// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them

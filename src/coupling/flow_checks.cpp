@@ -2,6 +2,7 @@
 
 #include "common/vec3.hpp"
 #include "core/error.hpp"
+#include "core/log.hpp"
 #include "core/units.hpp"
 #include "fluid/boundary_conditions.hpp"
 #include "input/case_checks.hpp"
@@ -158,6 +159,76 @@ void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>
     if (std::abs(net) > std::abs(worst)) worst = net, when = t;
   }
   if (std::abs(worst) > balanced * most) refuse_net_flux(boundaries, sides, when, worst);
+}
+
+void check_pressure_gradient(const Grid& grid, const Triple& gradient) {
+  constexpr double rounding = 1e-3;  // of the gradient: coordinates and gradients are given with a few digits
+  const Vec3 g{gradient[0], gradient[1], gradient[2]};
+  // What is left of it without its parts along the periods, made orthogonal one after the other.
+  Vec3 rest = g;
+  std::vector<Vec3> basis;
+  for (int d = 0; d < 3; ++d) {
+    if (!grid.index().periodic[d]) continue;
+    Vec3 p{grid.period(d)[0], grid.period(d)[1], grid.period(d)[2]};
+    for (const Vec3& b : basis) p -= dot(p, b) * b;
+    basis.push_back((1 / norm(p)) * p);
+    rest -= dot(rest, basis.back()) * basis.back();
+  }
+  if (norm(rest) <= rounding * norm(g)) return;
+  const Vec3 kept = g - rest;
+  throw InputError(fmt::format(
+      "fluid.pressure_gradient_Pa_per_um = [{:.4g}, {:.4g}, {:.4g}]: its part [{:.4g}, {:.4g}, {:.4g}] lies across the shifts between "
+      "the periodic sides, where it drives nothing: {}",
+      g.x, g.y, g.z, rest.x, rest.y, rest.z,
+      norm(kept) > rounding * norm(g) ? fmt::format("the same flow comes from [{:.6g}, {:.6g}, {:.6g}]", kept.x, kept.y, kept.z)
+                                      : std::string("give it along them, or make the sides that it points to periodic")));
+}
+
+namespace {
+
+/// @returns the first row of the table between two steps that see nothing of it, or -1
+int unseen_row(const BoundarySettings& s, const StepSchedule& schedule) {
+  constexpr double share = 0.1;  // of the largest factor
+  double largest = 0;
+  for (const auto& row : s.time_table) largest = std::max(largest, std::abs(row[1]));
+  std::size_t r = 0;
+  for (long tick = 0; tick < schedule.end() && r < s.time_table.size();) {
+    const long next = tick + schedule.ticks(tick);
+    const double from = time_factor(s, schedule.time_us(tick)), to = time_factor(s, schedule.time_us(next));
+    for (; r < s.time_table.size() && s.time_table[r][0] <= schedule.time_us(next); ++r) {
+      const double value = s.time_table[r][1], beyond = std::max(value - std::max(from, to), std::min(from, to) - value);
+      if (s.time_table[r][0] >= schedule.time_us(tick) && beyond > share * largest) return static_cast<int>(r);
+    }
+    tick = next;
+  }
+  return -1;
+}
+
+}  // namespace
+
+void check_courses(const std::vector<BoundarySettings>& boundaries, const StepSchedule& schedule) {
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    const auto& s = boundaries[b];
+    const double first = schedule.step_us(0);
+    if (s.ramp_us > 0 && s.ramp_us < first * (1 - 1e-9))
+      warn("boundary.{}.ramp_us = {:g}: the first step, of {:g} us, is longer: the same as no ramp; reduce time.first_step_us or "
+           "time.step_us to see it", b, s.ramp_us, first);
+    if (s.time_table.empty()) continue;
+    if (s.time_table.back()[0] < first * (1 - 1e-9))
+      throw InputError(fmt::format("boundary.{}.time_table: all of its rows lie within the first step, of {:g} us: times are in us; "
+                                   "multiply those in seconds by 1e6, or reduce time.step_us",
+                                   b, first));
+    const int row = unseen_row(s, schedule);
+    if (row < 0) continue;
+    const double at = s.time_table[row][0];
+    double apart = 1e300;
+    for (int other : {row - 1, row + 1})
+      if (other >= 0 && other < static_cast<int>(s.time_table.size())) apart = std::min(apart, std::abs(s.time_table[other][0] - at));
+    throw InputError(fmt::format(
+        "boundary.{}.time_table: row {} ({:g} us, factor {:g}) lies between two steps that see nothing of it, so what it prescribes is "
+        "lost: reduce time.step_us or time.first_step_us to {:.3g} us or less, or give a table that changes over several steps",
+        b, row, at, s.time_table[row][1], 0.5 * apart));
+  }
 }
 
 }  // namespace corpuscle

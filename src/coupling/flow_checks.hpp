@@ -1,6 +1,7 @@
-// Whether the velocities that a case prescribes on its sides can be those of an incompressible fluid.
+// Whether what a case prescribes on its sides can drive an incompressible fluid, and whether the steps see it.
 #pragma once
 
+#include "coupling/step_schedule.hpp"
 #include "grid/grid.hpp"
 
 namespace corpuscle {
@@ -8,5 +9,13 @@ namespace corpuscle {
 /// @throws InputError  if a moving wall moves through itself; or if nothing but prescribed velocities lets fluid in or out,
 ///                     and what comes in differs from what goes out at some time (naming the sides, the flux and the time)
 void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>& boundaries);
+
+/// @param gradient  imposed, in any unit
+/// @throws InputError  for one with a part across the shifts between the grid's periodic sides, which drives nothing
+void check_pressure_gradient(const Grid& grid, const Triple& gradient);
+
+/// Warns of ramps that end within the first step.
+/// @throws InputError  for a table whose changes the steps pass over, naming the row
+void check_courses(const std::vector<BoundarySettings>& boundaries, const StepSchedule& schedule);
 
 }  // namespace corpuscle

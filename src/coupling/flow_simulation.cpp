@@ -38,6 +38,8 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   const auto scope = timers_.scope("set-up");
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
   check_prescribed_flow(*grid_, scene.boundaries);
+  check_courses(scene.boundaries, schedule_);
+  check_pressure_gradient(*grid_, scene.fluid->pressure_gradient_Pa_per_um);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (!scene.cells.empty() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_);
 }
@@ -57,7 +59,8 @@ void FlowSimulation::step() {
 }
 
 std::string FlowSimulation::outflow_message() const {
-  return fmt::format("a cell reached the outflow: {} at {:.6g} us (time.stop_before_outflow_um)", coupling_->nearest_outflow(), time_);
+  return fmt::format("a cell reached the outflow: {} at {:.6g} us, and the limit is {}", coupling_->nearest_outflow(), time_,
+                     coupling_->outflow_limit(next_step_us()));
 }
 
 void FlowSimulation::resume(const Progress& progress) {
@@ -66,7 +69,7 @@ void FlowSimulation::resume(const Progress& progress) {
     throw InputError(fmt::format("no step of this case begins at {} us, where the checkpoint is: use another time.step_us or "
                                  "time.first_step_us", progress.time));
   constexpr double most = 2;  // beyond 1 + sqrt(2), errors of second-order backward differences grow (Hairer et al., III.5)
-  if (next_step_us() > most * progress.last_step * (1 + 1e-9))
+  if (progress.steps > 0 && next_step_us() > most * progress.last_step * (1 + 1e-9))
     throw InputError(fmt::format("the step can at most double at a restart: the checkpoint was written with steps of {} us, and "
                                  "this case goes on with {} us; reduce time.step_us", progress.last_step, next_step_us()));
   time_ = schedule_.time_us(tick_);

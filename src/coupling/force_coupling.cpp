@@ -21,10 +21,12 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       timers_(timers),
       lengths_us_(schedule.lengths_us()),
       membranes_(std::make_unique<Membranes>(scene.cells)),
-      frame_(periodic_frame(fluid.grid())) {
+      frame_(periodic_frame(fluid.grid())),
+      quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
   const int vertices = membranes_->vertices();
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, vertices);
   fluid.set_face_force(transfer_->faces());
+  fluid.raise_reference_speed(quiet_speed_);
   traction_ = Components<double>("corpuscle::coupling::traction", vertices, 3);
   Kokkos::deep_copy(membranes_->views().force, 0.0);
   if (fluid.grid().comm().size() > 1) velocity_host_ = HostCopy(membranes_->surfaces().v);
@@ -75,7 +77,7 @@ void ForceCoupling::place(double time) {
 
 void ForceCoupling::check_start() {
   wrap();
-  check_surfaces(fluid_.grid(), scene_, surfaces());
+  coarse_ = check_surfaces(fluid_.grid(), scene_, surfaces());
   try {
     place(0);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
@@ -95,7 +97,7 @@ void ForceCoupling::check_start() {
   }
   measure_stability();
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
-  if (longest > stable_us_)
+  if (!(longest <= stable_us_))
     throw InputError(
         fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "
                     "{:.3g} us{} they "
@@ -137,8 +139,19 @@ std::map<std::string, double> ForceCoupling::report(double dt) const {
   return {{"largest_stable_step_us", stable_us_}, {"margin", stable_us_ / dt}};
 }
 
-bool ForceCoupling::at_outflow(double dt) const {
-  return outflow_.distance < std::max(outflow_limit_, 2 * fluid_.statistics().reference_speed * dt);
+/// How far the fluid gets in two steps at the fastest that it has been: a cell that is nearer may leave the grid before it is
+/// looked at again. A reference speed that is only the one told from rest says nothing of it.
+double ForceCoupling::two_steps_um(double dt) const {
+  const auto& fluid = fluid_.statistics();
+  return 2 * dt * (fluid.reference_speed > quiet_speed_ ? fluid.reference_speed : fluid.speed);
+}
+
+bool ForceCoupling::at_outflow(double dt) const { return outflow_.distance < std::max(outflow_limit_, two_steps_um(dt)); }
+
+std::string ForceCoupling::outflow_limit(double dt) const {
+  const double two_steps = two_steps_um(dt);
+  if (two_steps > outflow_limit_) return fmt::format("{:.3g} um, as far as the flow gets in two steps (time.step_us)", two_steps);
+  return fmt::format("{:.3g} um (time.stop_before_outflow_um)", outflow_limit_);
 }
 
 std::string ForceCoupling::nearest_outflow() const {

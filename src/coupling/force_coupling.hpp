@@ -20,6 +20,8 @@ class ForceCoupling : public Coupling {
   std::string stability_text(double dt_us) const override;
   bool at_outflow(double dt_us) const override;
   std::string nearest_outflow() const override;
+  std::string outflow_limit(double dt_us) const override;
+  std::string coarse() const override { return coarse_; }
   std::map<std::string, double> report(double dt_us) const override;
   double power_on_cells() override;
   double unresolved_dissipation() override;
@@ -36,6 +38,7 @@ class ForceCoupling : public Coupling {
   void wrap();
   void collect();
   bool second_order(double dt) const;
+  double two_steps_um(double dt) const;
   SlipViews slip_of_membranes() const;
   std::string vertex_text(int vertex) const;
   void measure_stability();
@@ -50,7 +53,9 @@ class ForceCoupling : public Coupling {
   Array<double> slip_share_;                    // [vertex] empty: 1
   HostCopy<Components<double>> velocity_host_;  // only on several ranks
   PeriodicFrame frame_;
+  double quiet_speed_;        // um/us: what counts as rest
   Table<int> laps_;           // [cell, 3] only in periodic domains
+  std::string coarse_;        // which cells the grid resolves coarsely
   double stable_us_ = 0;      // largest stable step at the start
   double outflow_limit_ = 0;  // um
   NearSide outflow_;          // at the last place()

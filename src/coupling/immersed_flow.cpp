@@ -5,6 +5,7 @@
 #include "coupling/periodic_frame.hpp"
 #include "immersed/surface.hpp"
 #include "immersed/surface_motion.hpp"
+#include "input/case_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -16,7 +17,7 @@ namespace corpuscle {
 ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const Leaving& leaving, Timers& timers)
     : fluid_(fluid), surfaces_(surfaces), timers_(timers) {
   ImmersedOptions options;
-  for (int side = 0; side < 6; ++side) options.wall[side] = fluid.boundaries().is_wall(side);
+  for (int side = 0; side < 6; ++side) options.guarded[side] = !fluid.boundaries().bounded_by(side).empty();
   options.frame = periodic_frame(fluid.grid());
   if (fluid.shares_nodes()) {
     Grid* grid = &fluid.grid();
@@ -24,6 +25,7 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const
     options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
   }
   options.outflow = leaving.sides;
+  if (fluid.boundaries().has_outflow()) options.pressure_given = fluid.boundaries().outflow();
   options.travellers = leaving.vertices;
   boundary_ = std::make_unique<ImmersedBoundary>(fluid.grid().views(), surfaces, options);
   bodies_.bodies = surfaces.bodies;
@@ -78,11 +80,14 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   if (to_wall < smallest_gap) {
     const bool here = counts.wall_spacings == to_wall;
     vertex = static_cast<int>(comm.max(here ? static_cast<double>(counts.wall_vertex) : -1.0));
+    const int side = static_cast<int>(comm.max(static_cast<double>(boundary_->nearest_guarded_side(vertex))));
+    const std::string what = fluid_.boundaries().bounded_by(side);
+    const bool wall = what == "a wall";
     throw ComputationError(fmt::format(
-        "gap to the wall: {} is {:.2f} grid spacings from a wall, and {:.2f} are needed to resolve the film between "
-        "them. Contact forces do not exist yet: move or tilt the cell (center_um, axis), refine the grid (grid.nodes) "
-        "or use a wider channel",
-        boundary_->describe_vertex(vertex), to_wall, smallest_gap));
+        "gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
+        "them.{} Move or tilt the cell (center_um, axis), refine the grid (grid.nodes) or use a {}",
+        wall ? "the wall" : "a side", boundary_->describe_vertex(vertex), to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)),
+        smallest_gap, wall ? "film" : "flow", wall ? " Contact forces do not exist yet." : "", wall ? "wider channel" : "larger grid"));
   }
   check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
 }
@@ -94,6 +99,11 @@ void ImmersedFlow::check_clearance(int crossed, double between, double smallest_
   if (crossed > 0) {
     const bool here = counts.crossed_links == crossed;
     const auto [where, first, second] = describe_bodies(here ? counts.crossed_node : -1);
+    if (second.empty() && report_.classifications == 1)
+      throw ComputationError(fmt::format(
+          "surfaces cross: {} passes through itself near {}, as it is given, or folds there more tightly than the grid can tell: repair "
+          "its surface file, use more vertices, or refine the grid (grid.nodes)",
+          first, where));
     if (second.empty())
       throw ComputationError(fmt::format(
           "surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "

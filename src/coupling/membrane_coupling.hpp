@@ -16,8 +16,11 @@ class MembraneCoupling : public SharpCoupling {
   std::map<std::string, double> report(double dt_us) const override;
   bool at_outflow(double dt_us) const override;
   std::string nearest_outflow() const override;
+  std::string outflow_limit(double dt_us) const override;
 
  protected:
+  double default_beta(double dt_us) const;
+  void check_beta(double dt_us) const;
   void place_bodies(double time, double dt);
 
   Components<double> x_start_, v_interface_, residual_, previous_residual_;
@@ -26,6 +29,7 @@ class MembraneCoupling : public SharpCoupling {
 
  private:
   void watch_outflow();
+  double two_steps_um(double dt_us) const;
 
   double outflow_limit_ = 0;  // um
   double least_mass_per_area_ = 1e300, added_mass_per_area_ = 0, smallest_spacing_ = 0;  // pg/um2, pg/um2, um

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace corpuscle {
 
 namespace {
@@ -47,10 +49,13 @@ CellBox face_range(const IndexSpace& index, int d) {
 CellBox owned_box(const IndexSpace& index) { return {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}; }
 
 /// The stored state fits no other geometry.
-std::vector<CaseChange> allowed_changes(const std::string& path, const std::string& before, const std::string& now) {
+std::vector<CaseChange> allowed_changes(const std::string& path, const CheckpointHeader& before, const std::string& resolved,
+                                        const std::string& files) {
   std::vector<CaseChange> allowed;
   std::string refused;
-  for (const auto& change : case_changes(before, now)) {
+  auto changes = case_changes(before.resolved, resolved);
+  for (const auto& change : file_changes(before.files, files)) changes.push_back(change);
+  for (const auto& change : changes) {
     if (!change.geometry)
       allowed.push_back(change);
     else
@@ -69,12 +74,13 @@ const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i
 
 }  // namespace
 
-void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
-                      const std::string& totals) {
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const CheckpointTexts& texts) {
   const IndexSpace& index = simulation.grid().index();
   const auto progress = simulation.progress();
   CheckpointHeader header;
-  header.resolved = resolved;
+  header.resolved = texts.resolved;
+  header.files = texts.files;
+  header.run = texts.run;
   header.cells = {index.global[0], index.global[1], index.global[2]};
   header.step = progress.steps;
   header.time_us = progress.time;
@@ -114,7 +120,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const auto laps = simulation.immersed()->boundary().laps_state();
     file.add("laps", {laps.size()}, laps.data());
   }
-  file.add_text("totals", totals);
+  file.add_text("totals", texts.totals);
   file.commit();
 }
 
@@ -146,6 +152,8 @@ FluidState read_fluid(const CheckpointReader& file, FlowSimulation& simulation) 
     if (state.flux_old[d].data() && file.has(old_flux_name(d))) {
       file.read(old_flux_name(d), face_shape(index, d), slab, flux.data());
       set_box_values(index, faces, flux, state.flux_old[d]);
+    } else if (state.flux_old[d].data()) {  // written without convection: as if the flow had been the same a step before
+      Kokkos::deep_copy(state.flux_old[d], state.flux[d]);
     }
   }
   return state;
@@ -163,7 +171,7 @@ void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
   simulation.immersed()->boundary().set_laps_state(laps);
 }
 
-void read_coupling(const CheckpointReader& file, FlowSimulation& simulation) {
+void read_coupling(const CheckpointReader& file, FlowSimulation& simulation, bool cells_changed) {
   if (simulation.immersed()) read_surfaces(file, simulation);
   // Another scheme than that of the checkpoint starts without a history of its own.
   auto coupling = simulation.coupling()->state();
@@ -175,22 +183,26 @@ void read_coupling(const CheckpointReader& file, FlowSimulation& simulation) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());
     simulation.membranes()->set_state(membranes);
+    if (cells_changed) simulation.membranes()->forget_stiffness();
   }
 }
 
 }  // namespace
 
-Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved) {
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
+                         const std::string& files) {
   const IndexSpace& index = simulation.grid().index();
   const CheckpointReader file(path, simulation.grid().comm());
   Restored restored;
-  restored.changes = allowed_changes(path, file.header().resolved, resolved);
+  restored.changes = allowed_changes(path, file.header(), resolved, files);
   file.require_grid({index.global[0], index.global[1], index.global[2]});
   double numbers[2];
   std::int64_t levels = 0;
   file.read("numbers", {2}, numbers);
   file.read("history_levels", {1}, &levels);
-  if (simulation.coupling()) read_coupling(file, simulation);
+  const bool cells_changed = std::any_of(restored.changes.begin(), restored.changes.end(),
+                                         [](const CaseChange& change) { return change.key.rfind("cell", 0) == 0; });
+  if (simulation.coupling()) read_coupling(file, simulation, cells_changed);
   try {
     simulation.resume({file.header().time_us, numbers[1], file.header().step});
   } catch (const InputError& error) {
@@ -202,6 +214,7 @@ Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, co
   state.step_us = numbers[1];
   state.history_levels = static_cast<int>(levels);
   simulation.fluid().restore(state);
+  if (simulation.coupling() && file.header().step > 0) simulation.coupling()->resume(file.header().time_us);
   restored.totals = file.text("totals");
   return restored;
 }

@@ -11,22 +11,28 @@
 
 namespace corpuscle {
 
-/// Write everything that continuing with the same bits needs; the previous checkpoint stays until this one is complete.
-/// @param totals  what the report has gathered so far, the same on all ranks
-/// @throws ComputationError  when the disk is full
-void write_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
-                      const std::string& totals);
+/// What a checkpoint says beyond the state of the simulation; all the same on all ranks.
+struct CheckpointTexts {
+  std::string resolved;  // the case, as Case::resolved has it
+  std::string files;     // fingerprints of the files that it names, see file_changes()
+  std::string run;       // which run this is
+  std::string totals;    // what the report has gathered so far
+};
 
-/// What a checkpoint says beyond the state of the simulation.
+/// Write everything that continuing with the same bits needs; the previous checkpoint stays until this one is complete.
+/// @throws ComputationError  when the disk is full
+void write_checkpoint(const std::string& path, FlowSimulation& simulation, const CheckpointTexts& texts);
+
 struct Restored {
   std::string totals;
   std::vector<CaseChange> changes;  // of keys that a restart may change
 };
 
 /// Go on from a checkpoint, on any number of ranks.
-/// @param resolved  the present case
+/// @param resolved, files  of the present case
 /// @throws InputError  for a file that is damaged, foreign, or of another grid, other sides, or other cells or bodies
-Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved);
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
+                         const std::string& files);
 
 }  // namespace corpuscle
 

@@ -53,6 +53,11 @@ StepStatistics SharpCoupling::advance(double time, double dt) {
   return {};
 }
 
+void SharpCoupling::resume(double time) {
+  move_rigid_bodies(time);
+  has_flow_ = true;
+}
+
 const Components<double>& SharpCoupling::tractions_for_output() {
   if (!membranes_ && has_flow_) immersed_->tractions();
   return immersed_->last_tractions();

@@ -12,6 +12,7 @@ class SharpCoupling : public Coupling {
 
   void check_start() override;
   StepStatistics advance(double time_us, double dt_us) override;
+  void resume(double time_us) override;
   const Components<double>& tractions_for_output() override;
   std::string coarse() const override { return coarse_; }
   std::vector<Triple> wrapped_by() const override { return immersed_->wrapped_by(); }

@@ -15,7 +15,7 @@ namespace corpuscle {
 class StepSchedule {
  public:
   /// @param changes_us  sudden changes of the inflow, in any order; see sudden_changes()
-  /// @throws InputError  end_us is not a whole number of steps
+  /// @throws InputError  end_us is not a whole number of steps, or too many, or the first ones would be too short
   explicit StepSchedule(const TimeSettings& settings, const std::vector<double>& changes_us = {});
 
   double time_us(long tick) const { return static_cast<double>(tick) * shortest_; }

@@ -32,17 +32,32 @@ double interpolate(const std::vector<std::array<double, 2>>& table, double at) {
   return table.back()[1];
 }
 
+bool is_wall_type(Type type) { return type == Type::wall || type == Type::moving_wall; }
+
+bool is_box(const GridSettings* grid) { return grid && grid->generator == GridSettings::Generator::box; }
+
+/// Parabola between two opposite sides: zero at walls, flat where a side is symmetric or periodic.
+/// @param from_middle  place, -1 at the lower side, 1 at the upper one
+double parabola(double from_middle, bool wall_below, bool wall_above) {
+  if (!wall_below && !wall_above) return 1;
+  double s = from_middle;
+  if (!wall_below) s = 0.5 * (1 + from_middle);
+  if (!wall_above) s = 0.5 * (1 - from_middle);
+  return 1 - s * s;
+}
+
 /// Velocity profile over a side, before it is scaled to the wanted mean: 1 on average is not needed here.
-double shape_factor(const BoundarySettings& s, const GridSettings* grid, const IndexSpace& index, const Triple& x,
+/// @param types  of the six sides
+double shape_factor(const BoundarySettings& s, const GridSettings* grid, const Type (&types)[6], const Triple& x,
                     const Triple& centre, double radius, int d) {
   if (s.profile == BoundarySettings::Profile::uniform) return 1;
-  if (s.profile == BoundarySettings::Profile::parabolic && grid && grid->generator == GridSettings::Generator::box) {
+  if (s.profile == BoundarySettings::Profile::parabolic && is_box(grid)) {
     double factor = 1;
     for (int e = 0; e < 3; ++e) {
-      if (e == d || index.periodic[e]) continue;
+      if (e == d) continue;
       const double half = 0.5 * (grid->upper_um[e] - grid->lower_um[e]);
       const double from_middle = (x[e] - grid->lower_um[e]) / half - 1;
-      factor *= 1 - from_middle * from_middle;
+      factor *= parabola(from_middle, is_wall_type(types[2 * e]), is_wall_type(types[2 * e + 1]));
     }
     return factor;
   }
@@ -59,10 +74,13 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
                                        const GridSettings* shape)
     : grid_(&grid), outflow_("corpuscle::fluid::outflow_mask", grid.index().size()) {
   const IndexSpace& index = grid.index();
-  for (const auto& s : settings) {
+  for (std::size_t b = 0; b < settings.size(); ++b) {
+    const auto& s = settings[b];
+    types_[static_cast<int>(s.side)] = s.type;
     if (s.type == Type::periodic) continue;
     Side side;
     side.settings = s;
+    side.number = static_cast<int>(b);
     side.d = static_cast<int>(s.side) / 2;
     side.end = static_cast<int>(s.side) % 2;
     side.here = grid.halo().neighbour(side.d, side.end) < 0;
@@ -106,6 +124,44 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
   set_time(0);
 }
 
+/// A parabola is known for boxes between walls, symmetric and periodic sides, and for round inlets within walls.
+/// @param centre, radius  of the inlet, um: no point of it is farther from the centre
+void BoundaryConditions::check_parabolic(const Side& side, bool box, const Triple& centre, double radius) const {
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(fmt::format("boundary.{}.profile = \"parabolic\": {}; use \"uniform\"{}", side.number, why,
+                                 box ? "" : ", or \"table\" with a radial_table"));
+  };
+  bool walls = true;
+  for (int other = 0; other < 6; ++other) {
+    if (other / 2 == side.d) continue;
+    walls = walls && is_wall_type(types_[other]);
+    if (box && (types_[other] == Type::velocity_inlet || types_[other] == Type::outflow))
+      refuse("a side beside it lets fluid in or out, and what the flow looks like there is not known");
+  }
+  if (box) return;
+  constexpr double round = 0.95;  // the rim is a polygon: 0.966 with twelve corners
+  const IndexSpace& index = grid_->index();
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_->views().x);
+  double least = radius;
+  for (int e = 0; e < 3 && side.here; ++e)
+    for (int end = 0; e != side.d && end < 2; ++end) {
+      if (grid_->halo().neighbour(e, end) >= 0) continue;
+      CellBox rim = side.box;
+      for (int f = 0; f < 3; ++f)
+        if (f != side.d) rim.lower[f] = 0, rim.upper[f] = index.n[f];
+      rim.lower[e] = end == 0 ? -1 : index.n[e];
+      rim.upper[e] = rim.lower[e] + 1;
+      for (int k = rim.lower[2]; k < rim.upper[2]; ++k)
+        for (int j = rim.lower[1]; j < rim.upper[1]; ++j)
+          for (int i = rim.lower[0]; i < rim.upper[0]; ++i) {
+            const int c = index.cell(i, j, k);
+            least = std::min(least, std::hypot(x(c, 0) - centre[0], x(c, 1) - centre[1], x(c, 2) - centre[2]));
+          }
+    }
+  if (!walls || grid_->comm().min(least) < round * radius)
+    refuse("this inlet is not a disc within walls, and another shape's profile is not known on such a grid");
+}
+
 void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape) {
   const IndexSpace& index = grid_->index();
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_->views().x);
@@ -141,6 +197,7 @@ void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape
   });
   radius = grid_->comm().max(radius);
 
+  if (side.settings.profile == BoundarySettings::Profile::parabolic) check_parabolic(side, is_box(shape), centre, radius);
   Triple direction{sums[0] / flat, sums[1] / flat, sums[2] / flat};
   double scale = side.settings.speed;
   const bool fixed = side.settings.velocity.has_value();
@@ -151,18 +208,19 @@ void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape
     double flux = 0;  // of the profile with unit speed
     visit(false, [&](int c) {
       for (int m = 0; m < 3; ++m)
-        flux += shape_factor(side.settings, shape, index, point(c), centre, radius, side.d) * direction[m] * inward *
+        flux += shape_factor(side.settings, shape, types_, point(c), centre, radius, side.d) * direction[m] * inward *
                 area(c + side.to_face, m);
     });
     flux = grid_->comm().sum(flux);
     if (!(flux > 0))
-      throw InputError("boundary: the inlet profile carries no flow; check radial_table");
+      throw InputError(fmt::format("boundary.{}.radial_table: this inlet profile carries no flow: its speeds must be positive on "
+                                   "average over the side", side.number));
     scale *= flat / flux;
   }
   auto profile = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), profile_);
   double largest = 0;
   visit(true, [&](int c) {
-    const double factor = scale * (fixed ? 1 : shape_factor(side.settings, shape, index, point(c), centre, radius, side.d));
+    const double factor = scale * (fixed ? 1 : shape_factor(side.settings, shape, types_, point(c), centre, radius, side.d));
     for (int m = 0; m < 3; ++m) profile(c, m) = factor * direction[m];
     largest = std::max(largest, std::hypot(profile(c, 0), profile(c, 1), profile(c, 2)));
   });
@@ -237,11 +295,12 @@ double BoundaryConditions::balance(const Array<double> (&flux)[3], double growth
   return std::abs(per_area);
 }
 
-bool BoundaryConditions::is_wall(int number) const {
-  for (const auto& side : sides_)
-    if (static_cast<int>(side.settings.side) == number)
-      return side.settings.type == Type::wall || side.settings.type == Type::moving_wall;
-  return false;
+std::string BoundaryConditions::bounded_by(int side) const {
+  switch (types_[side]) {
+    case Type::velocity_inlet: return "an inlet";
+    case Type::symmetry: return "a symmetry side";
+    default: return is_wall_type(types_[side]) ? "a wall" : "";
+  }
 }
 
 }  // namespace corpuscle

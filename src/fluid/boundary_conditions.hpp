@@ -5,6 +5,8 @@
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
 
+#include <string>
+
 namespace corpuscle {
 
 /// What the velocities of an inlet or moving wall are multiplied with at time t, us: linear between the ends of its ramp
@@ -41,12 +43,14 @@ class BoundaryConditions {
   double largest_speed() const { return largest_speed_; }
   /// Prescribed velocity at boundary nodes, [cell, 3] um/us; allocated only if some side prescribes one.
   const Components<double>& given() const { return given_; }
-  /// Whether cells beside this side are bounded by a wall (for the immersed boundary's wall guard).
-  bool is_wall(int side) const;
+  /// What bounds the fluid at this side so that no surface may come near: "a wall", "an inlet", "a symmetry side"; "" for the
+  /// others (for the immersed boundary's guard).
+  std::string bounded_by(int side) const;
 
  private:
   struct Side {
     BoundarySettings settings;
+    int number = 0;      // its entry in the case
     int d = 0, end = 0;  // direction, and 0 for its low end or 1 for its high end
     bool here = false;   // this rank touches it
     CellBox box;         // boundary nodes, halo included
@@ -56,10 +60,12 @@ class BoundaryConditions {
     CellBox faces;       // owned faces of the side
   };
   void set_profile(const Side& side, const GridSettings* shape);
+  void check_parabolic(const Side& side, bool box, const Triple& centre, double radius) const;
   template <class Velocity>
   void fill_sides(const Velocity& u, bool homogeneous) const;
 
   Grid* grid_;
+  BoundarySettings::Type types_[6] = {};
   std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges
   PressureMask outflow_;
   Components<double> profile_, given_;

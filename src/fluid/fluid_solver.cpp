@@ -167,9 +167,10 @@ void FluidSolver::begin_step(double dt) {
     if (settings_.convection == FluidSettings::Convection::extrapolated) Kokkos::deep_copy(work_, u_);
   }
   ++history_levels_;
-  const double reference_speed = statistics_.reference_speed;
+  const FluidStatistics before = statistics_;
   statistics_ = {};
-  statistics_.reference_speed = reference_speed;
+  statistics_.reference_speed = before.reference_speed;
+  statistics_.speed = before.speed;
 }
 
 void FluidSolver::assemble_history(double time) {
@@ -314,8 +315,8 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
 /// @param residual  of the momentum equation with the present velocity and pressure, over the velocity
 void FluidSolver::solve_and_project(const EmbeddedBodies* bodies, double residual) {
   solve_momentum(bodies, residual);
-  statistics_.reference_speed =
-      larger(statistics_.reference_speed, grid_->comm().max(largest_speed(grid_->index(), kind_, u_)));
+  statistics_.speed = grid_->comm().max(largest_speed(grid_->index(), kind_, u_));
+  statistics_.reference_speed = larger(statistics_.reference_speed, statistics_.speed);
   project(bodies);
   ++statistics_.projections;
 }

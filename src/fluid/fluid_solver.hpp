@@ -22,7 +22,8 @@ namespace corpuscle {
 struct FluidStatistics {
   int momentum_iterations = 0, pressure_iterations = 0, solves = 0, projections = 0;
   double divergence = 0;       // largest net flux out of a fluid cell, um3/us
-  double reference_speed = 0;  // um/us: the largest prescribed or computed so far
+  double reference_speed = 0;  // um/us: the largest prescribed or computed so far, or a scale that the caller raised it to
+  double speed = 0;            // um/us: the largest at a node in the last solve
   double flux_correction = 0;  // largest correction of a body's net flux over (reference speed x area of its faces)
 };
 
@@ -106,6 +107,7 @@ class FluidSolver {
   void fill_halos(const Components<double>& u);
   void assemble_history(double time_us);
   double momentum_residual();
+  double residual_target(double size);
   void solve_momentum(const EmbeddedBodies* bodies, double residual);
   void project(const EmbeddedBodies* bodies);
   void solve_and_project(const EmbeddedBodies* bodies, double residual);

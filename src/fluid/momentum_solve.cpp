@@ -126,6 +126,20 @@ double FluidSolver::momentum_residual() {
   return residual_norm_ / std::sqrt(std::max(squares[1], floor));
 }
 
+/// A share of the velocity is no small share of what drives a slow flow: where less than that is asked for in a step, nothing
+/// would be solved, and the flow would go on as extrapolated. So a tolerance looser than the default asks for a hundredth of
+/// the change over the step at least, which the residual then falsifies by a hundredth; as the flow comes to rest, both vanish.
+/// @param size  of the velocity, as a residual; 0 at rest, where the first residual is the change
+double FluidSolver::residual_target(double size) {
+  constexpr double strict = 1e-6, share = 0.01;
+  const double tolerance = settings_.momentum_tolerance, scale = std::max(size, residual_norm_);
+  if (tolerance <= strict) return tolerance * scale;
+  if (size == 0) return std::min(tolerance, share) * scale;
+  const double change = std::sqrt(grid_->comm().sum(
+      inertia_square(grid_->views(), kind_, mass_ / mu_, momentum_->cycle.levels()[0].views.inverse, u_, u_old_)));
+  return std::max(strict * scale, std::min(tolerance * scale, share * change));
+}
+
 /// Corrections until the residual is small enough, each of at most four digits: single precision has no more to give. Several
 /// are needed where an immersed node is the last one before an outflow, whose velocity lags behind it by one correction.
 void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) {
@@ -133,7 +147,7 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
   constexpr double least_reduction = 1e-4, margin = 0.9;
   // Relative to the velocity; to the first residual in the first steps from rest, where there is no velocity yet.
   const double size = residual > 0 ? residual_norm_ / residual : 0;
-  const double target = settings_.momentum_tolerance * std::max(size, residual_norm_);
+  const double target = residual_target(size);
   Correction correction(*this, bodies);
   const double start = residual_norm_;
   int iterations = 0;

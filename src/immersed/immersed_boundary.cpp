@@ -76,7 +76,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   }
   images_ = make_images(grid.index, options.frame.period);
   find_bounds(lattice_, locate_);
-  std::copy(options.wall.begin(), options.wall.end(), locate_.wall);
+  std::copy(options.guarded.begin(), options.guarded.end(), locate_.guarded);
   std::copy(options.outflow.begin(), options.outflow.end(), locate_.outflow);
   locate_.travellers = options.travellers;
 
@@ -97,6 +97,7 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   nodes_ = {make<Array<NodeKind>>("kind", cells), make<Array<int>>("body", cells)};
   previous_kind_ = make<Array<NodeKind>>("previous_kind", cells);
   reached_ = make<Array<std::int8_t>>("reached", cells);
+  extended_ = make<Array<std::int8_t>>("extended", cells);
   node_counts_ = make<Array<int>>("node_counts", count_slots + 2 * surface.bodies);
   row_counts_ = make<Array<int>>("row_counts", 2 * row_kinds);
   traction_counts_ = make<Array<int>>("traction_counts", static_cast<int>(traction_counts));
@@ -104,6 +105,8 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
   stress_ = make_surface_stress("corpuscle::immersed::stress_vertex", surface.vertices);
   if (periodic()) laps_ = Table<int>("corpuscle::immersed::laps", surface.bodies, 3);
   Kokkos::deep_copy(places_.status, Located::failed);
+  Kokkos::deep_copy(extended_, std::int8_t{0});
+  if (options.pressure_given.data()) mark_known_pressure(options.pressure_given, extended_);
   if (surface.bodies * images_.count > 1) least_gap_ = make<Array<Key>>("least_gap", 1);
   box_host_ = HostCopy(places_.box);
   found_host_ = HostCopy(places_.found);
@@ -239,13 +242,19 @@ int ImmersedBoundary::absorb_pockets(const NodeBox& box) {
     faces.open[d][1] = box.upper[d] < lattice_.upper[d];
   }
   const IndexSpace& index = grid_.index;
+  const auto left = [&] {
+    reach_all(index, box, nodes_, reached_);
+    const long own = count_unreached(index, box, nodes_, reached_);
+    return options_.sum ? options_.sum(own) : own;
+  };
+  Kokkos::deep_copy(Exec(), reached_, std::int8_t{1});  // outside this rank's box, which another rank's may overlap
   seed_open_fluid(index, box, faces, band_, nodes_, reached_);
-  reach_all(index, box, nodes_, reached_);
-  long unreached = count_unreached(index, box, nodes_, reached_);
-  if (options_.sum) unreached = options_.sum(unreached);
-  for (long added = unreached; added > 0 && options_.exchange;) {
+  long unreached = left();
+  // Owned nodes alone tell the end: what a rank has reached in its halo is gone with the next exchange.
+  for (long before = unreached + 1; unreached > 0 && unreached < before && options_.exchange;) {
+    before = unreached;
     options_.exchange(reached_);
-    added = options_.sum(static_cast<long>(reach_all(index, box, nodes_, reached_)));
+    unreached = left();
   }
   return unreached > 0 ? absorb_unreached(index, box, surface_, band_, nodes_, reached_) : 0;
 }
@@ -304,6 +313,7 @@ void ImmersedBoundary::build_stencils() {
   Kokkos::deep_copy(Exec(), row_counts_, 0);
   build_velocity_rows(input(), counts_.immersed, velocity_, feet_, row_counts_);
   build_pressure_rows(input(), counts_.immersed, pressure_, row_counts_);
+  if (options_.exchange) options_.exchange(extended_);
   const auto& counts = row_counts_host_.read();
   for (int k = 0; k < row_kinds; ++k) {
     counts_.velocity_rows[k] = counts(k);
@@ -350,6 +360,22 @@ std::string ImmersedBoundary::describe_vertex(int vertex) const {
   const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
   return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y,
                      x.z);
+}
+
+int ImmersedBoundary::nearest_guarded_side(int vertex) const {
+  const int image = to_host(places_.image)(vertex);
+  if (image < 0) return -1;
+  const auto places = to_host(places_.xi);
+  const int item = image * surface_.vertices + vertex;
+  const double xi[3] = {places(item, 0), places(item, 1), places(item, 2)};
+  int nearest = -1;
+  double least = 1e300;
+  for (int side = 0; side < 6; ++side) {
+    const bool here = side % 2 == 0 ? lattice_.boundary_below[side / 2] : lattice_.boundary_above[side / 2];
+    const double gap = spacings_to_side(lattice_, xi, side);
+    if (here && options_.guarded[side] && gap < least) least = gap, nearest = side;
+  }
+  return nearest;
 }
 
 NearBodies ImmersedBoundary::bodies_near(int node) const {

@@ -16,7 +16,7 @@
 namespace corpuscle {
 
 struct ImmersedOptions {
-  std::array<bool, 6> wall{};  // i_min, i_max, j_min, ...: no-slip sides, for the wall guard
+  std::array<bool, 6> guarded{};  // i_min, i_max, j_min, ...: sides that no surface may come near
   PeriodicFrame frame;         // of the periodic directions
   /// Where nodes of others lie beside this block's (other ranks', or its own at the other end of a periodic direction): the
   /// sum over all ranks, and the exchange of halos.
@@ -24,6 +24,7 @@ struct ImmersedOptions {
   std::function<void(const Array<std::int8_t>&)> exchange;
   std::array<bool, 6> outflow{}; // sides through which the first `travellers` vertices, those of cells, may leave
   int travellers = 0;
+  Array<unsigned char> pressure_given;   // [cell] boundary nodes where the pressure is known, those of outflow sides; empty for none
 };
 
 /// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
@@ -37,7 +38,7 @@ struct ImmersedCounts {
   std::vector<int> body_immersed, body_inside;
   std::array<int, row_kinds> velocity_rows{}, pressure_rows{};  // by RowKind
   int lost_vertex = -1;         // lowest vertex beyond a physical boundary seen here; -1: none
-  double wall_spacings = 1e30;  // least distance to a wall, in local spacings
+  double wall_spacings = 1e30;  // least distance to a guarded side, in local spacings
   int wall_vertex = -1;         // the vertex that has it
   double outflow_um = 1e30;     // least distance of a cell to an outflow, along the grid line
   int outflow_vertex = -1;      // the vertex that has it
@@ -114,11 +115,13 @@ class ImmersedBoundary {
   void forget_places() { locate_.warm = false; }
   /// "bodies.2, vertex 17 at (x, y, z) um"; copies from the device.
   std::string describe_vertex(int vertex) const;
+  /// The guarded side nearest to a vertex that this rank owns, -1 for others; copies from the device.
+  int nearest_guarded_side(int vertex) const;
   /// The bodies beside a node of the band; copies from the device.
   NearBodies bodies_near(int node) const;
 
  private:
-  StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_}; }
+  StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_, extended_}; }
   NodeBox read_places();
   void classify_nodes(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
@@ -142,6 +145,7 @@ class ImmersedBoundary {
   NodeViews nodes_;
   Array<NodeKind> previous_kind_;
   Array<std::int8_t> reached_;
+  Array<std::int8_t> extended_;  // see StencilInput
   Array<int> node_counts_, row_counts_, traction_counts_;
   Array<Key> least_gap_;  // empty where there is only one body
   HostCopy<Array<int>> box_host_, node_counts_host_, row_counts_host_;

@@ -76,14 +76,21 @@ struct BoundarySettings {
   bool operator==(const BoundarySettings&) const = default;
 };
 
-/// [[cells]]
+/// [[cells]], with what its type says
 struct CellSettings {
-  enum class Reference { shape, spontaneous_angle, uniform };
+  enum class Shape { biconcave, sphere, ellipsoid };
+  enum class Law { wlc_pow, neo_hookean, skalak };
+  enum class Reference { shape, spontaneous_angle, uniform, spheroid };
   enum class Interior { empty, cytosol };
   enum class Dissipation { central, full };
 
+  int type = -1;                        // of Case::cell_types; -1: all keys are in place
   int vertices = 500;
-  std::string mesh;                     // OFF or STL file instead of the built-in biconcave shape; "" if none
+  Shape shape = Shape::biconcave;       // unless there is a mesh
+  double diameter_um = 7.82;            // biconcave
+  double radius_um = 0;                 // sphere
+  Triple semi_axes_um{};                // ellipsoid
+  std::string mesh;                     // OFF or STL file instead of a built-in shape; "" if none
   double scale = 1;                     // mesh: um per unit of the file
   bool recenter = true;                 // mesh: center_um is the centroid of its volume; false: the file's origin
   bool align = true;                    // mesh: if it is a disc, its own axis is the symmetry axis; false: the file's z
@@ -91,11 +98,15 @@ struct CellSettings {
   Triple axis{0, 0, 1};                 // direction of the cell's symmetry axis
   double spin_deg = 0;                  // rotation of the mesh about that axis
   double mass_pg = 100;
+  Law law = Law::wlc_pow;
+  double skalak_c = 1;                  // skalak: modulus of area = shear modulus (1 + 2 C)
   Reference reference = Reference::shape;
+  double reference_reduced_volume = 0.95;  // spheroid: 6 sqrt(pi) V / A^(3/2) of the shape that the sheet rests on
+  double inflation = 0;                 // sphere: radius over that at which the sheet rests, less 1
   Interior interior = Interior::empty;
-  double shear_modulus_uN_per_m = 6.32; // from the springs; sets p l0
+  double shear_modulus_uN_per_m = 6.32; // at small strains, of any law
   double bending_modulus_fJ = 2.4e-4;   // kappa; k_b = 2 kappa / sqrt(3)
-  double area_modulus_uN_per_m = 236;   // k_a
+  double area_modulus_uN_per_m = 236;   // k_a; for sheets (neo_hookean, skalak) a case's default is 0 for both
   double local_area_modulus_uN_per_m = 4.82;  // k_d
   double volume_modulus_Pa = 248;       // k_v
   double membrane_viscosity_N_s_per_m = 0;
@@ -103,6 +114,20 @@ struct CellSettings {
 
   bool operator==(const CellSettings&) const = default;
 };
+
+/// [[cell_types]]
+struct CellTypeSettings {
+  std::string name;
+  CellSettings cell;                    // of its cells, but for their places
+
+  bool operator==(const CellTypeSettings&) const = default;
+};
+
+/// A key of the section that a cell's constants are in, for messages: "cell_types.0.vertices", or "cells.vertices" where all
+/// keys are in place.
+inline std::string constant_key(const CellSettings& cell, const std::string& key) {
+  return (cell.type < 0 ? "cells." : "cell_types." + std::to_string(cell.type) + ".") + key;
+}
 
 /// [[bodies]]: rigid, held or moved as prescribed
 struct BodySettings {
@@ -170,10 +195,12 @@ struct Case {
   std::string path;                     // of the case file
   std::string title;
   std::string resolved;                 // every key with the value used, as TOML; stored with the results
+  std::vector<std::string> remarks;     // on keys that are given and have no effect
   TimeSettings time;
   std::optional<GridSettings> grid;
   std::optional<FluidSettings> fluid;
   std::vector<BoundarySettings> boundaries;
+  std::vector<CellTypeSettings> cell_types;
   std::vector<CellSettings> cells;
   std::vector<BodySettings> bodies;
   std::optional<CouplingSettings> coupling;

@@ -1,7 +1,6 @@
 #include "input/case_changes.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <sstream>
 #include <utility>
@@ -51,17 +50,17 @@ bool is_geometry(const std::string& key) {
   if (starts_with(key, "number of") || starts_with(key, "grid.")) return true;
   if (starts_with(key, "bodies.")) return true;  // moved as prescribed from the start: another velocity is another place
   if (starts_with(key, "boundary.")) return ends_with(key, ".side") || ends_with(key, ".type");
-  if (!starts_with(key, "cells.")) return false;
-  for (const char* name : {".vertices", ".mesh", ".interior", ".scale", ".recenter"})
+  if (!starts_with(key, "cells.") && !starts_with(key, "cell_types.")) return false;
+  for (const char* name : {".type", ".vertices", ".shape", ".diameter_um", ".radius_um", ".semi_axes_um", ".mesh", ".interior",
+                           ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg"})
     if (ends_with(key, name)) return true;
   return false;
 }
 
-/// The same file in another folder.
-bool moved_file(const CaseChange& change) {
-  const auto name = [](const std::string& text) { return std::filesystem::path(text).filename(); };
-  const bool file = ends_with(change.key, ".mesh") || ends_with(change.key, ".file");
-  return file && name(change.before) == name(change.now);
+/// A file under another path: what is in it counts, see file_changes().
+bool other_path(const std::string& key, const std::string& before, const std::string& now) {
+  const auto named = [](const std::string& value) { return value.size() > 2 && value.front() == '"'; };
+  return (ends_with(key, ".mesh") || ends_with(key, ".file")) && named(before) && named(now);
 }
 
 }  // namespace
@@ -71,20 +70,34 @@ std::vector<CaseChange> case_changes(const std::string& before, const std::strin
   const std::string absent = "absent";
   std::vector<CaseChange> changes;
   const auto note = [&](const std::string& key, const std::string& old_value, const std::string& new_value) {
-    if (old_value == new_value || only_of_the_run(key)) return;
-    CaseChange change{key, old_value, new_value, is_geometry(key)};
-    if (moved_file(change)) change.geometry = false;
-    changes.push_back(change);
+    if (old_value == new_value || only_of_the_run(key) || other_path(key, old_value, new_value)) return;
+    // Membranes as forces have fluid inside, others have none.
+    const bool other_fluid = key == "coupling.scheme" && (old_value == "\"force\"" || new_value == "\"force\"");
+    changes.push_back({key, old_value, new_value, is_geometry(key) || other_fluid});
   };
   const auto find = [](const Values& values, const std::string& key) {
     return std::find_if(values.begin(), values.end(), [&](const auto& value) { return value.first == key; });
   };
   for (const auto& [key, value] : new_values) {
     const auto old = find(old_values, key);
-    note(key, old == old_values.end() ? absent : old->second, value);
+    if (old != old_values.end())
+      note(key, old->second, value);
+    else
+      note(key, absent, value);
   }
   for (const auto& [key, value] : old_values)
     if (find(new_values, key) == new_values.end()) note(key, value, absent);
+  return changes;
+}
+
+std::vector<CaseChange> file_changes(const std::string& before, const std::string& now) {
+  const Values old_values = values_of(before);
+  std::vector<CaseChange> changes;
+  const auto path = [](const std::string& value) { return value.substr(value.find(' ') + 1); };
+  for (const auto& [key, value] : values_of(now))
+    for (const auto& [old_key, old_value] : old_values)
+      if (old_key == key && old_value.substr(0, old_value.find(' ')) != value.substr(0, value.find(' ')))
+        changes.push_back({key, path(old_value) + " with other content", path(value), true});
   return changes;
 }
 

@@ -16,4 +16,8 @@ struct CaseChange {
 /// @param before, now  resolved cases, as Case::resolved has them
 std::vector<CaseChange> case_changes(const std::string& before, const std::string& now);
 
+/// Files that both name under the same key, and whose content differs.
+/// @param before, now  a line for each: "cells.0.mesh = <fingerprint of its content> <path>"
+std::vector<CaseChange> file_changes(const std::string& before, const std::string& now);
+
 }  // namespace corpuscle

@@ -45,8 +45,26 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
              "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
   for (std::size_t c = 0; c < scene.cells.size(); ++c)
     if (scene.cells[c].membrane_viscosity_N_s_per_m > 0)
-      complain(fmt::format("cells.{}", c), "membrane_viscosity_N_s_per_m",
-               "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
+      complain(scene.cells[c].type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", scene.cells[c].type),
+               "membrane_viscosity_N_s_per_m", "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
+}
+
+/// Whether each part of the gradient has periodic sides to drive fluid between, on grids whose index directions are x, y, z;
+/// on others their geometry decides, see check_pressure_gradient().
+void check_gradient(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
+  const auto& gradient = scene.fluid->pressure_gradient_Pa_per_um;
+  const auto generator = scene.grid->generator;
+  const bool straight = generator == GridSettings::Generator::box || generator == GridSettings::Generator::straight_tube;
+  const auto periodic = [&](int d) { return scene.boundaries[entry_of[2 * d]].type == Type::periodic; };
+  const bool any = periodic(0) || periodic(1) || periodic(2);
+  for (int d = 0; d < 3; ++d) {
+    if (gradient[d] == 0 || (straight ? periodic(d) : any)) continue;
+    if (!any) complain("fluid", "pressure_gradient_Pa_per_um", "an imposed pressure gradient needs a pair of periodic sides");
+    complain("fluid", "pressure_gradient_Pa_per_um",
+             fmt::format("its {} component drives nothing, since {} and {} are not periodic: give it along a periodic direction, or make "
+                         "both sides \"periodic\"",
+                         "xyz"[d], name_of(static_cast<Side>(2 * d)), name_of(static_cast<Side>(2 * d + 1))));
+  }
 }
 
 }  // namespace
@@ -78,14 +96,7 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
   if (inlets == 1 && outflows == 0)
     complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
 
-  for (int d = 0; d < 3; ++d) {
-    const double gradient = scene.fluid->pressure_gradient_Pa_per_um[d];
-    const bool any_periodic = scene.boundaries[entry_of[0]].type == Type::periodic ||
-                              scene.boundaries[entry_of[2]].type == Type::periodic ||
-                              scene.boundaries[entry_of[4]].type == Type::periodic;
-    if (gradient != 0 && !any_periodic)
-      complain("fluid", "pressure_gradient_Pa_per_um", "an imposed pressure gradient needs a pair of periodic sides");
-  }
+  check_gradient(scene, entry_of, complain);
 }
 
 void check_modules(const Case& scene, const Complaint& complain) {

@@ -10,6 +10,7 @@
 #include "core/error.hpp"
 #include "core/nearest.hpp"
 #include "input/case_checks.hpp"
+#include "input/case_file.hpp"
 #include "input/overrides.hpp"
 #include "input/sections.hpp"
 
@@ -19,10 +20,11 @@ namespace {
 // Hands out the sections of one case file and gathers their echo.
 class CaseReader {
  public:
-  CaseReader(const std::string& path, const std::vector<std::string>& overrides) {
-    source_.file = path;
-    source_.folder = std::filesystem::path(path).parent_path().string();
-    parse(path);
+  CaseReader(const CaseFile& file, const std::vector<std::string>& overrides) {
+    source_.file = file.path;
+    const bool piped = file.path.rfind("/dev/", 0) == 0 || file.path.rfind("/proc/", 0) == 0;  // beside the user, then
+    source_.folder = piped ? "" : std::filesystem::path(file.path).parent_path().string();
+    parse(file);
     source_.overrides = apply_overrides(root_, overrides);
     check_section_names();
   }
@@ -36,12 +38,14 @@ class CaseReader {
     if (root_.contains("fluid")) scene.fluid = one<FluidSettings>("fluid", read_fluid);
     each("boundary", [&](Section& s) { scene.boundaries.push_back(read_boundary(s)); });
     const bool placed = scene.fluid.has_value();
-    each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, placed)); });
+    each("cell_types", [&](Section& s) { scene.cell_types.push_back(read_cell_type(s, scene.cell_types)); });
+    each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, scene.cell_types, placed)); });
     each("bodies", [&](Section& s) { scene.bodies.push_back(read_body(s)); });
     const bool coupled = scene.fluid && !scene.cells.empty();
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
     if (root_.contains("stretching")) scene.stretching = one<StretchingSettings>("stretching", read_stretching);
     check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
+    if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) note_without_effect(scene);
     read_time_section(scene);
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
@@ -50,19 +54,13 @@ class CaseReader {
   }
 
  private:
-  void parse(const std::string& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
-    std::ifstream in(path, std::ios::binary);
-    const std::string text((std::istreambuf_iterator<char>(in)), {});
-    if (!in.is_open() || in.bad())
-      throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+  void parse(const CaseFile& file) {
     try {
-      root_ = toml::parse(text, path);
+      root_ = toml::parse(file.text, file.path);
     } catch (const toml::parse_error& error) {
       const auto& at = error.source().begin;
       throw InputError(
-          fmt::format("{}:{}: not valid TOML at column {}: {}", path, at.line, at.column, error.description()));
+          fmt::format("{}:{}: not valid TOML at column {}: {}", file.path, at.line, at.column, error.description()));
     }
   }
 
@@ -111,6 +109,26 @@ class CaseReader {
     scene.time = one<TimeSettings>("time", read_time);
   }
 
+  /// Keys of cells that membranes as forces have no use for: refused, they would have to be taken out of a case to try it with
+  /// this coupling.
+  void note_without_effect(Case& scene) const {
+    for (const auto& [key, why] : {std::pair{"mass_pg", "membranes have no mass of their own"},
+                                   {"interior", "the fluid is inside the cells as well, as viscous as outside"}}) {
+      std::string first;
+      int others = -1;
+      for (const char* list : {"cell_types", "cells"}) {
+        const auto* entries = root_.contains(list) ? root_.get(list)->as_array() : nullptr;
+        for (std::size_t n = 0; entries && n < entries->size(); ++n) {
+          const auto* found = entries->get(n)->as_table()->get(key);
+          if (found && ++others == 0) first = fmt::format("{}.{}.{} = {}", list, n, key, toml_text(*found));
+        }
+      }
+      if (others < 0) continue;
+      scene.remarks.push_back(fmt::format("{}{} has no effect with coupling.scheme = \"force\": {}", first,
+                                          others > 0 ? fmt::format(" (and {} more)", others) : "", why));
+    }
+  }
+
   template <class Settings, class Read>
   Settings one(const std::string& name, const Read& read) {
     const auto* node = root_.get(name);
@@ -148,8 +166,20 @@ class CaseReader {
 
 }  // namespace
 
+CaseFile load_case_file(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
+  std::ifstream in(path, std::ios::binary);
+  CaseFile file{path, {std::istreambuf_iterator<char>(in), {}}};
+  if (!in.is_open() || in.bad())
+    throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+  return file;
+}
+
+Case read_case(const CaseFile& file, const std::vector<std::string>& overrides) { return CaseReader(file, overrides).read(); }
+
 Case read_case(const std::string& path, const std::vector<std::string>& overrides) {
-  return CaseReader(path, overrides).read();
+  return read_case(load_case_file(path), overrides);
 }
 
 }  // namespace corpuscle

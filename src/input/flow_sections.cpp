@@ -9,7 +9,6 @@
 namespace corpuscle {
 namespace {
 
-constexpr double most_um = 1e7;  // of a grid: volumes and their squares stay far from the largest numbers
 
 void read_centerline(Section& s, GridSettings& grid) {
   using Centerline = GridSettings::Centerline;
@@ -53,8 +52,8 @@ void check_grid(const Section& s, const GridSettings& grid) {
 
 TimeSettings read_time(Section& s) {
   TimeSettings time;
-  time.step_us = s.number("step_us", positive());
-  time.end_us = s.number("end_us", positive());
+  time.step_us = s.number("step_us", positive(1e12));
+  time.end_us = s.number("end_us", positive(1e15));
   time.first_step_us = s.number("first_step_us", not_negative(), 0.0);
   time.stop_before_outflow_um = s.number("stop_before_outflow_um", not_negative(), time.stop_before_outflow_um);
   s.finish();
@@ -103,6 +102,7 @@ FluidSettings::Convection read_convection(Section& s) {
   using Convection = FluidSettings::Convection;
   const std::string allowed = "must be false, true (the same as \"extrapolated\"), \"extrapolated\" or \"implicit\"";
   Convection convection = Convection::extrapolated;
+  s.describe("convection", allowed.substr(std::string("must be ").size()), "\"extrapolated\"");
   if (const auto* found = s.node("convection")) {
     const auto text = found->value<std::string>();
     if (found->is_boolean()) {
@@ -123,14 +123,14 @@ FluidSettings::Convection read_convection(Section& s) {
 
 FluidSettings read_fluid(Section& s) {
   FluidSettings f;
-  f.density_pg_per_um3 = s.number("density_pg_per_um3", positive(), f.density_pg_per_um3);
+  f.density_pg_per_um3 = s.number("density_pg_per_um3", positive(1e6), f.density_pg_per_um3);
   f.kinematic_viscosity_um2_per_us =
-      s.number("kinematic_viscosity_um2_per_us", positive(), f.kinematic_viscosity_um2_per_us);
+      s.number("kinematic_viscosity_um2_per_us", positive(1e12), f.kinematic_viscosity_um2_per_us);
   f.convection = read_convection(s);
   f.momentum_tolerance = s.number("momentum_tolerance", between(1e-15, 0.1), f.momentum_tolerance);
   f.divergence_tolerance = s.number("divergence_tolerance", between(1e-16, 0.1), f.divergence_tolerance);
   f.max_iterations = s.integer("max_iterations", 1, 100000, f.max_iterations);
-  f.pressure_gradient_Pa_per_um = s.triple("pressure_gradient_Pa_per_um", any_number(), f.pressure_gradient_Pa_per_um);
+  f.pressure_gradient_Pa_per_um = s.triple("pressure_gradient_Pa_per_um", between(-1e12, 1e12), f.pressure_gradient_Pa_per_um);
   s.finish();
   return f;
 }
@@ -140,6 +140,7 @@ namespace {
 // A number is a mean speed along the inward normal, a triple is a vector.
 void read_boundary_velocity(Section& s, BoundarySettings& b) {
   const std::string key = "velocity_mm_per_s";
+  const Bounds allowed = between(-1e9, 1e9);
   const bool inlet = b.type == BoundarySettings::Type::velocity_inlet;
   const bool moving = b.type == BoundarySettings::Type::moving_wall;
   if (!inlet && !moving) {
@@ -148,11 +149,11 @@ void read_boundary_velocity(Section& s, BoundarySettings& b) {
   }
   const auto* found = s.node(key);
   if (found && inlet && found->is_number()) {
-    b.speed = s.number(key, any_number()) * units::mm_per_s;
+    b.speed = s.number(key, allowed) * units::mm_per_s;
   } else if (found && inlet && !found->is_array()) {
     s.fail(key, "must be a number (mean speed along the inward normal) or three numbers [x, y, z]");
   } else if (found) {
-    b.velocity = scaled(s.triple(key, any_number()), units::mm_per_s);
+    b.velocity = scaled(s.triple(key, allowed), units::mm_per_s);
   } else {
     s.require(key, inlet ? "a number (mean speed along the inward normal) or three numbers [x, y, z]"
                          : "three numbers [x, y, z]");

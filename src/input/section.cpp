@@ -11,14 +11,20 @@
 
 namespace corpuscle {
 
-Bounds any_number() { return {-1e300, 1e300, false, "a number"}; }
+namespace {
+
+/// Large limits are powers of ten: 1e+12 rather than all its zeros.
+std::string limit_text(double limit) { return std::abs(limit) >= 1e9 ? fmt::format("{:g}", limit) : fmt::format("{}", limit); }
+
+}  // namespace
+
 Bounds positive(double high) {
-  return {0, high, true, high < 1e300 ? fmt::format("a number above 0, at most {}", high) : "a number above 0"};
+  return {0, high, true, high < 1e300 ? "a number above 0, at most " + limit_text(high) : "a number above 0"};
 }
 Bounds not_negative(double high) {
-  return {0, high, false, high < 1e300 ? fmt::format("a number from 0 to {}", high) : "a number, 0 or more"};
+  return {0, high, false, high < 1e300 ? "a number from 0 to " + limit_text(high) : "a number, 0 or more"};
 }
-Bounds between(double low, double high) { return {low, high, false, fmt::format("a number from {} to {}", low, high)}; }
+Bounds between(double low, double high) { return {low, high, false, fmt::format("a number from {} to {}", limit_text(low), limit_text(high))}; }
 
 std::string toml_text(const std::string& text) {
   std::string quoted = "\"";
@@ -65,12 +71,17 @@ std::string toml_text(const toml::node& node) {
 Section::Section(const CaseSource& source, std::string path, const toml::table* table)
     : source_(source), path_(std::move(path)), table_(table) {}
 
+void Section::know(const std::string& key) {
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
+}
+
 const toml::node* Section::node(const std::string& key) {
   know(key);
   return table_ ? table_->get(key) : nullptr;
 }
 
 double Section::number(const std::string& key, const Bounds& allowed, std::optional<double> fallback) {
+  record(key, allowed.text, fallback ? toml_text(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, allowed.text), 0;
   const double value = found ? number_in(key, *found, allowed) : *fallback;
@@ -80,6 +91,7 @@ double Section::number(const std::string& key, const Bounds& allowed, std::optio
 
 int Section::integer(const std::string& key, int low, int high, std::optional<int> fallback) {
   const auto allowed = fmt::format("a whole number from {} to {}", low, high);
+  record(key, allowed, fallback ? std::to_string(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, allowed), low;
   if (found && (!found->is_integer() || *found->value<std::int64_t>() < low || *found->value<std::int64_t>() > high))
@@ -90,6 +102,7 @@ int Section::integer(const std::string& key, int low, int high, std::optional<in
 }
 
 bool Section::flag(const std::string& key, bool fallback) {
+  record(key, "true or false", fallback ? "true" : "false", true);
   const auto* found = node(key);
   if (found && !found->is_boolean()) fail(key, "must be true or false");
   const bool value = found ? *found->value<bool>() : fallback;
@@ -98,6 +111,7 @@ bool Section::flag(const std::string& key, bool fallback) {
 }
 
 std::string Section::text(const std::string& key, std::optional<std::string> fallback) {
+  record(key, "a text in quotes", fallback ? toml_text(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, "a text in quotes"), "";
   if (found && !found->is_string()) fail(key, "must be a text in quotes");
@@ -108,6 +122,7 @@ std::string Section::text(const std::string& key, std::optional<std::string> fal
 
 Triple Section::triple(const std::string& key, const Bounds& allowed, std::optional<Triple> fallback) {
   const auto description = "three numbers [x, y, z], each " + allowed.text;
+  record(key, description, fallback ? toml_text(fallback->data(), 3) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, description), Triple{};
   Triple value = fallback.value_or(Triple{});
@@ -124,6 +139,7 @@ Triple Section::triple(const std::string& key, const Bounds& allowed, std::optio
 
 std::array<int, 3> Section::integers(const std::string& key, int low, int high) {
   const auto allowed = fmt::format("three whole numbers [i, j, k], each from {} to {}", low, high);
+  record(key, allowed, "", false);
   const auto* found = node(key);
   if (!found) return miss(key, allowed), std::array<int, 3>{low, low, low};
   const auto* list = found->as_array();
@@ -143,6 +159,7 @@ std::vector<std::array<double, N>> Section::rows(const std::string& key, std::si
   const auto allowed = fmt::format("a list of {} or more rows of {} numbers, such as [[{}], ...]", min_rows, N,
                                    N == 2 ? "0, 1" : "0, 0, 1");
   std::vector<std::array<double, N>> values;
+  record(key, allowed, "", true);
   const auto* found = node(key);
   if (!found) return values;
   const auto* list = found->as_array();
@@ -160,6 +177,13 @@ template std::vector<std::array<double, 2>> Section::rows<2>(const std::string&,
 template std::vector<std::array<double, 3>> Section::rows<3>(const std::string&, std::size_t);
 
 std::string Section::file(const std::string& key, bool required) {
+  if (recorder_) {
+    record(key, "the path of a file, in quotes", "", !required);
+    know(key);
+    if (!required) recorder_->choices[key] = {"none", "a file"};
+    const bool given = required || (recorder_->chosen.count(key) && recorder_->chosen[key] == 1);
+    return given ? "recorded.off" : "";
+  }
   const auto* found = node(key);
   if (!found) {
     if (required) miss(key, "the path of a file, in quotes");
@@ -177,14 +201,27 @@ std::string Section::file(const std::string& key, bool required) {
 }
 
 void Section::unused(const std::string& key, const std::string& why) {
+  if (recorder_) recorder_->unused.emplace(key, why);
   if (node(key)) fail(key, why);
 }
 
 void Section::require(const std::string& key, const std::string& allowed) {
+  record(key, allowed, "", false);
   if (!has(key)) miss(key, allowed);
 }
 
+void Section::record(const std::string& key, const std::string& allowed, const std::string& value, bool optional) {
+  if (!recorder_) return;
+  for (auto& known : recorder_->keys)
+    if (known.key == key) {
+      if (!optional) known.allowed = allowed, known.optional = false;  // required after all
+      return;
+    }
+  recorder_->keys.push_back({key, allowed, value, optional, ""});
+}
+
 void Section::finish() {
+  if (recorder_) return;
   if (table_) {
     for (const auto& [key, value] : *table_) {
       const std::string name(key.str());
@@ -201,6 +238,13 @@ void Section::finish() {
   fail(key, "required key is missing; it must be " + allowed);
 }
 
+std::vector<std::string> Section::present() const {
+  std::vector<std::string> keys;
+  if (table_)
+    for (const auto& [key, value] : *table_) keys.emplace_back(key.str());
+  return keys;
+}
+
 std::string Section::echo() const {
   std::string text;
   for (const auto& [key, value] : echo_) text += key + " = " + value + "\n";
@@ -208,6 +252,7 @@ std::string Section::echo() const {
 }
 
 void Section::fail(const std::string& key, const std::string& problem) const {
+  if (recorder_) throw RecordingEnds();
   const auto* found = table_ ? table_->get(key) : nullptr;
   const auto value = found ? " = " + toml_text(*found) : "";
   const auto name = key.empty() ? path_ : path_.empty() ? key : path_ + "." + key;
@@ -216,6 +261,13 @@ void Section::fail(const std::string& key, const std::string& problem) const {
 
 std::size_t Section::word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback) {
   const auto allowed = fmt::format("one of \"{}\"", fmt::join(names, "\", \""));
+  if (recorder_) {
+    record(key, allowed, fallback < names.size() ? toml_text(names[fallback]) : "", fallback < names.size());
+    know(key);
+    recorder_->choices[key] = names;
+    const auto chosen = recorder_->chosen.find(key);
+    return chosen != recorder_->chosen.end() ? chosen->second : std::min(fallback, names.size() - 1);
+  }
   const auto* found = node(key);
   if (!found && fallback >= names.size()) {
     for (const auto& [other, value] : table_ ? *table_ : toml::table{})

@@ -29,16 +29,37 @@ struct Bounds {
 
   bool contains(double value) const { return (low_excluded ? value > low : value >= low) && value <= high; }
 };
-Bounds any_number();
 Bounds positive(double high = 1e300);
 Bounds not_negative(double high = 1e300);
 Bounds between(double low, double high);
+
+/// What a reader asks of a section, gathered while it reads an empty one: each key with its default and what is allowed.
+struct KeyRecord {
+  std::string key, allowed;
+  std::string value;     // the default as TOML, "" if the key is required
+  bool optional = false; // without a default: may be left out
+  std::string only;      // where the key has no meaning: why, as the message there says
+};
+struct KeyRecorder {
+  std::map<std::string, std::size_t> chosen;                 // which word the reader is to find for each choice
+  std::map<std::string, std::vector<std::string>> choices;   // those it has asked for, with their words
+  std::vector<KeyRecord> keys;
+  std::map<std::string, std::string> unused;                 // keys without meaning in this run, and why
+};
+/// Thrown where a reader refuses the values that it was given by a recorder.
+struct RecordingEnds {};
 
 class Section {
  public:
   /// @param path   as used in messages and by --set: "time", "cells.0"
   /// @param table  null: the section is absent and every value is its default
   Section(const CaseSource& source, std::string path, const toml::table* table);
+
+  /// From now on every key is recorded, and nothing is refused or missed.
+  void record_into(KeyRecorder& recorder) { recorder_ = &recorder; }
+  /// Of a key that is read by other means than those below.
+  /// @param value  default as TOML; "" for a key that may be left out
+  void describe(const std::string& key, const std::string& allowed, const std::string& value) { record(key, allowed, value, true); }
 
   bool has(const std::string& key) const { return table_ && table_->contains(key); }
   const toml::node* node(const std::string& key);
@@ -82,19 +103,26 @@ class Section {
 
   [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
   const std::string& path() const { return path_; }
+  const CaseSource& source() const { return source_; }
+  /// The keys that were asked for, whether present or not.
+  const std::vector<std::string>& known() const { return known_; }
+  /// The keys that are present.
+  std::vector<std::string> present() const;
 
  private:
+  void record(const std::string& key, const std::string& allowed, const std::string& value, bool optional);
   std::size_t word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback);
   double number_in(const std::string& key, const toml::node& node, const Bounds& allowed) const;
   std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count,
                                  const std::string& allowed) const;
   std::string where(const std::string& key) const;
-  void know(const std::string& key) { known_.push_back(key); }
+  void know(const std::string& key);
   void miss(const std::string& key, const std::string& allowed) { missing_.emplace_back(key, allowed); }
 
   const CaseSource& source_;
   std::string path_;
   const toml::table* table_;
+  KeyRecorder* recorder_ = nullptr;
   std::vector<std::string> known_;
   std::vector<std::pair<std::string, std::string>> missing_;  // key, what it should be
   std::vector<std::pair<std::string, std::string>> echo_;

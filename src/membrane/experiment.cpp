@@ -66,9 +66,26 @@ std::vector<ExperimentPoint> read_experiment(const std::string& path) {
   return points;
 }
 
+namespace {
+
+/// An eighth of the second difference is how far a parabola through three points lies from the chords between neighbours; of
+/// two points alone, nothing is known but that the curve lies between them.
+double interpolation_error(const std::vector<StretchingStep>& steps) {
+  double most = 0;
+  for (double StretchingStep::*diameter : {&StretchingStep::axial_um, &StretchingStep::transverse_um}) {
+    if (steps.size() == 2) most = std::max(most, 0.5 * std::abs(steps[1].*diameter - steps[0].*diameter));
+    for (std::size_t n = 2; n < steps.size(); ++n)
+      most = std::max(most, std::abs(steps[n].*diameter - 2 * steps[n - 1].*diameter + steps[n - 2].*diameter) / 8);
+  }
+  return most;
+}
+
+}  // namespace
+
 ExperimentComparison compare(const StretchingResult& result, const std::vector<ExperimentPoint>& experiment) {
   ExperimentComparison c;
   const auto& steps = result.steps;
+  c.interpolation_um = interpolation_error(steps);
   for (const ExperimentPoint& p : experiment) {
     if (p.force_pN < steps.front().force_pN || p.force_pN > steps.back().force_pN) continue;
     const auto upper = std::find_if(steps.begin() + 1, steps.end() - 1,

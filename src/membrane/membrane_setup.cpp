@@ -1,9 +1,8 @@
 #include "membrane/membrane_setup.hpp"
 
 #include <cmath>
+#include <map>
 #include <string>
-
-#include "core/error.hpp"
 
 namespace corpuscle {
 
@@ -52,6 +51,28 @@ void fill_reference(MembraneViews& m, const std::vector<CellReference>& types) {
   Kokkos::deep_copy(m.rest_sin, sine);
 }
 
+/// The constants of all types that have the law; the others' places stay empty.
+template <class Law>
+Array<Law> constants(const std::vector<CellReference>& types) {
+  std::vector<Law> laws;
+  for (const CellReference& type : types) {
+    const Law* law = std::get_if<Law>(&type.in_plane);
+    laws.push_back(law ? *law : Law{});
+  }
+  return to_device("in_plane_law_type", laws);
+}
+
+/// @param law  whose kind counts
+template <class Cells>
+std::unique_ptr<Elasticity> elasticity_of(const MembraneLaw& law, const std::vector<CellReference>& types, const Cells& cells) {
+  return std::visit(
+      [&](const auto& one) -> std::unique_ptr<Elasticity> {
+        using Law = std::decay_t<decltype(one)>;
+        return std::make_unique<ElasticityOf<Law, Cells>>(constants<Law>(types), cells);
+      },
+      law);
+}
+
 }  // namespace
 
 MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
@@ -73,20 +94,17 @@ MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<C
   return m;
 }
 
-std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types) {
-  const MembraneLaw any = types.empty() ? MembraneLaw() : types[0].in_plane;
-  return std::visit(
-      [&](const auto& first) -> std::unique_ptr<Elasticity> {
-        using Law = std::decay_t<decltype(first)>;
-        std::vector<Law> laws;
-        for (const CellReference& type : types) {
-          const Law* law = std::get_if<Law>(&type.in_plane);
-          if (!law) throw InputError("cells: all cells of a scene must have the same membrane law");
-          laws.push_back(*law);
-        }
-        return std::make_unique<ElasticityOf<Law>>(to_device("in_plane_law_type", laws));
-      },
-      any);
+std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell) {
+  std::map<std::size_t, std::vector<int>> cells_of;  // by the law's place in MembraneLaw
+  for (std::size_t c = 0; c < type_of_cell.size(); ++c) cells_of[types[type_of_cell[c]].in_plane.index()].push_back(int(c));
+  if (cells_of.empty()) return std::make_unique<MixedElasticity>(std::vector<std::unique_ptr<Elasticity>>{});
+  std::vector<std::unique_ptr<Elasticity>> parts;
+  for (const auto& [law, cells] : cells_of) {
+    const MembraneLaw& one = types[type_of_cell[cells[0]]].in_plane;
+    if (cells_of.size() == 1) return elasticity_of(one, types, AllCells{int(cells.size())});
+    parts.push_back(elasticity_of(one, types, ListedCells{to_device("cells_law", cells), int(cells.size())}));
+  }
+  return std::make_unique<MixedElasticity>(std::move(parts));
 }
 
 MotionViews make_motion_views(const MembraneViews& m) {

@@ -16,9 +16,9 @@ namespace corpuscle {
 MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
                                   const std::vector<int>& type_of_cell);
 
-/// The kernels of the types' in-plane law, of which all must be of one kind.
-/// @throws InputError  if they are not
-std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types);
+/// The kernels of the cells' in-plane laws: one set for a scene of one law, further ones for each further law.
+/// @param type_of_cell  [cell] index into types
+std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell);
 
 MotionViews make_motion_views(const MembraneViews& membranes);
 

@@ -21,7 +21,7 @@ constexpr int power_iterations = 30;  // gives the largest eigenvalue to about 5
 constexpr double step_margin = 0.3;   // of the largest stable step: links stiffen up to fivefold before they break
 constexpr double volume_rate = 1e-3;  // share of V0 per us by which a cell that starts away from V0 is brought there
 constexpr int most_retries = 4;
-constexpr int most_substeps = 1000000;
+constexpr int most_substeps = 10000;  // a minute or so for one cell
 
 }  // namespace
 
@@ -41,6 +41,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
     }
     type_of_cell.push_back(type);
     bodies.push_back(placed_mesh(types[type], cell));
+    law_.push_back(types[type].in_plane);
     vertex_mass_.push_back(types[type].law.vertex_mass);
     vertex_area_.push_back(types[type].smallest_vertex_area);
     rest_area_.push_back(types[type].law.rest_area);
@@ -51,7 +52,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
   views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
   views_.surface.cells = views_.cells;
-  elasticity_ = make_elasticity(types);
+  elasticity_ = make_elasticity(types, type_of_cell);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   status_host_ = HostCopy(views_.status);
@@ -99,8 +100,8 @@ int Membranes::substeps(double dt_us, double beta) const {
   if (!(count <= most_substeps)) {
     throw ComputationError(
         fmt::format("membrane: a step of {:.3g} us would take {:.3g} sub-steps of {:.3g} us; reduce "
-                    "time.step_us or raise cells.mass_pg",
-                    dt_us, count, step));
+                    "time.step_us or raise cells.mass_pg ({} are the most)",
+                    dt_us, count, step, most_substeps));
   }
   return std::max(1, int(count));
 }
@@ -143,7 +144,7 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
   if (beta > 0 && (stress.values.extent(0) == 0 || v_star.extent(0) == 0)) {
     throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both stress and v_star");
   }
-  if (calls_ % estimate_period == 0) estimate_stiffness();
+  if (calls_ % estimate_period == 0 || stiffness_.empty()) estimate_stiffness();
   ++calls_;
   // The solver of the volume constraint starts from nothing, so that a step depends on the state alone.
   if (viscosity_) Kokkos::deep_copy(motion_.direction, 0.0);
@@ -169,6 +170,7 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
 }
 
 void Membranes::set_out(double ahead_us) {
+  drifts_ = true;
   copy_motion(views_.vertices, views_.surface.x, views_.surface.v, start_x_, start_v_);
   if (ahead_us > 0) move_along(views_.vertices, start_x_, start_v_, ahead_us, views_.surface.x);
 }
@@ -221,23 +223,23 @@ void Membranes::explain(int cell, double dt) {
   const bool finite = std::isfinite(now.area_um2) && std::isfinite(now.volume_um3) && std::isfinite(now.stretch);
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   const CellDiagnostics before = diagnostics()[cell];
+  const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
   const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", cell, before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
+  const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
   const std::string step =
       dt > 0 ? fmt::format(" within a step of {:.3g} us, even in {} times as many sub-steps", dt, 1 << most_retries)
              : std::string();
   if (finite) {
     throw ComputationError(fmt::format(
-        "membrane overstretched: {}: a link reached {:.3f} of its contour length{} ({:.3f} before). The load "
-        "is too large or the coupling unstable: reduce time.step_us or the load, or raise "
-        "cells.shear_modulus_uN_per_m or coupling.robin_coefficient_pg_per_um2_per_us",
-        where, now.stretch, step, before.stretch));
+        "membrane overstretched: {}: {}{} ({} before). The load is too large or the coupling unstable: reduce time.step_us or the "
+        "load, or raise its shear_modulus_uN_per_m{}",
+        where, reached, step, was, robin));
   }
   throw ComputationError(fmt::format(
-      "membrane position is not finite: {}{} (largest stretch before: {:.3f} of the contour length). The traction on "
-      "it "
-      "is not finite or the step too long: reduce time.step_us, or raise cells.mass_pg or coupling.robin_coefficient_pg_per_um2_per_us",
-      where, step, before.stretch));
+      "membrane position is not finite: {}{} ({} before). The traction on it is not finite or the step too long: reduce "
+      "time.step_us{}{}",
+      where, step, was, drifts_ ? "" : ", or raise its mass_pg", robin));
 }
 
 void Membranes::save_state() {

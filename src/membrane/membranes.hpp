@@ -21,8 +21,9 @@ struct CellDiagnostics {
   Triple lower_um{}, upper_um{};  // extremes along x, y, z
   double area_um2 = 0, volume_um3 = 0;
   double rest_area_um2 = 0, rest_volume_um3 = 0;  // A0, V0
-  double springs_fJ = 0, bending_fJ = 0, global_area_fJ = 0, local_area_fJ = 0, volume_fJ = 0;
-  double stretch = 0;  // largest strain of any triangle; with springs, length over contour length of a link: breaks at 1
+  double springs_fJ = 0, bending_fJ = 0, global_area_fJ = 0, local_area_fJ = 0, volume_fJ = 0;  // springs or another law
+  double stretch = 0;  // largest strain of any triangle: of springs, length over contour length of a link, which breaks
+                       // at 1; of a sheet, the larger principal stretch
 
   double energy_fJ() const { return springs_fJ + bending_fJ + global_area_fJ + local_area_fJ + volume_fJ; }
   Triple extent_um() const { return {upper_um[0] - lower_um[0], upper_um[1] - lower_um[1], upper_um[2] - lower_um[2]}; }
@@ -44,8 +45,9 @@ class Membranes {
   SurfaceSet& surfaces() { return views_.surface; }
   const SurfaceSet& surfaces() const { return views_.surface; }
   const MembraneViews& views() const { return views_; }
-  /// Of the cells' in-plane law.
   const Elasticity& elasticity() const { return *elasticity_; }
+  /// In the plane of a cell's membrane.
+  const MembraneLaw& law(int cell) const { return law_[cell]; }
   int cells() const { return views_.cells; }
   int vertices() const { return views_.vertices; }
 
@@ -56,7 +58,7 @@ class Membranes {
   double largest_stiffness_nN_per_um();
 
   /// Internal forces at the present positions into views().force [vertex, 3] nN.
-  /// @throws ComputationError  if a link is stretched to its contour length
+  /// @throws ComputationError  if a triangle is strained beyond the limit of its law
   void compute_forces();
 
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
@@ -70,7 +72,7 @@ class Membranes {
   /// projects v so that the volume stays V0, and moves x += dt_s v. D, the membrane viscosity, is implicit.
   /// The sub-step is that of a vertex whose mass and drag see a stiffness 1/0.09 times the largest estimated: without
   /// beta this is 0.3 x 2/omega_max, and where beta dominates 0.18 beta A/k, which resolves the fastest relaxation.
-  /// The stiffness is estimated anew every 100th call. A step that overstretches a link is tried again from the start
+  /// The stiffness is estimated anew every 100th call. A step that overstretches a triangle is tried again from the start
   /// with 2, 4, 8 and 16 times as many sub-steps.
   /// The level of the pressure has no effect.
   /// @param stress    of the fluid at the vertices, or without values
@@ -100,6 +102,9 @@ class Membranes {
 
   /// One entry a cell. Copies from the device: for output, not for every sub-step.
   std::vector<CellDiagnostics> diagnostics();
+
+  /// Estimate the stiffness anew at the next advance(): the cells' constants are not those of the state.
+  void forget_stiffness() { stiffness_.clear(); }
 
   /// Kinetic energy of all cells' membranes, fJ, and the power that membrane viscosity takes from them, nW.
   double kinetic_energy_fJ() const;
@@ -131,11 +136,13 @@ class Membranes {
   MotionViews motion_;
   HostCopy<Array<int>> status_host_;
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
+  std::vector<MembraneLaw> law_;                 // [cell]
   std::vector<double> vertex_mass_;              // [cell] pg
   std::vector<double> vertex_area_;              // [cell] smallest at rest, um2
   std::vector<double> stiffness_;                // [cell] largest eigenvalue, nN/um; empty before the first estimate
   std::vector<double> rest_area_, rest_volume_;  // [cell]
   long calls_ = 0;                               // of advance
+  bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()
   std::unique_ptr<Snapshot> saved_;
   std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any
 };

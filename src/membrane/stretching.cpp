@@ -9,15 +9,11 @@
 #include "core/error.hpp"
 #include "core/units.hpp"
 #include "membrane/inertia.hpp"
-#include "membrane/membrane_setup.hpp"
-#include "membrane/relaxation.hpp"
+#include "membrane/rest_search.hpp"
 
 namespace corpuscle {
 
 namespace {
-
-constexpr int check_every = 50;       // iterations between looks at the residual, which wait for the device
-constexpr int estimate_every = 1000;  // iterations between estimates of the stiffness, which limits the step
 
 /// Vertices of the two ends: first the `count` with the largest x, then the `count` with the smallest.
 std::vector<int> end_vertices(const SurfaceSet& surfaces, int vertices, int count) {
@@ -37,15 +33,10 @@ class Stretcher {
       : membranes_(membranes),
         settings_(settings),
         patch_(std::max(1, int(std::lround(settings.patch_fraction * membranes.vertices())))),
-        ends_(end_vertices(membranes.surfaces(), membranes.vertices(), patch_)) {
-    const auto& m = membranes.views();
-    const auto label = [](const char* name) { return std::string("corpuscle::membrane::") + name; };
-    work_.applied = Components<double>(label("applied_vertex"), m.vertices, 3);
-    work_.force = Components<double>(label("relaxation_force_vertex"), m.vertices, 3);
-    work_.sums = Table<double>(label("relaxation_sums_section"), m.cells * sections, 3);
-    work_.engine = Table<double>(label("relaxation_engine"), 2 * m.cells, 3);
-    edge_ = std::sqrt(4 * membranes.diagnostics()[0].area_um2 / (std::sqrt(3.0) * m.triangles));
-  }
+        ends_(end_vertices(membranes.surfaces(), membranes.vertices(), patch_)),
+        search_(membranes.views(), membranes.elasticity(),
+                typical_edge(membranes.diagnostics()[0].area_um2, membranes.views().triangles),
+                [&] { return membranes_.largest_stiffness_nN_per_um(); }) {}
 
   int patch() const { return patch_; }
 
@@ -55,19 +46,12 @@ class Stretcher {
     const double scale = (force_pN > 0 ? force_pN : first_force_pN) * units::pN / patch_;
     StretchingStep step;
     step.force_pN = force_pN;
-    RelaxationLimits limits = estimate_limits();
-    start_relaxation(membranes_.views(), work_, limits);
-    while (true) {
-      relax(membranes_.views(), membranes_.elasticity(), work_, limits, step.iterations, check_every);
-      step.iterations += check_every;
-      step.residual = largest_force(membranes_.views(), work_) / scale;
-      if (step.residual <= settings_.tolerance) break;
-      if (step.iterations >= settings_.max_iterations || !std::isfinite(step.residual)) fail(step);
-      if (step.iterations % estimate_every == 0) limits = estimate_limits();
-    }
-    Kokkos::deep_copy(membranes_.surfaces().v, 0.0);
+    const auto outcome = search_.run(settings_.tolerance * scale, settings_.max_iterations);
+    step.iterations = outcome.iterations;
+    step.residual = outcome.force / scale;
+    if (!outcome.at_rest) fail(step);
     step.cell = membranes_.diagnostics()[0];
-    if (!(step.cell.stretch < membranes_.elasticity().limit())) fail(step);
+    if (!(step.cell.stretch < strain_limit(membranes_.law(0)))) overstretched(step);
     const Triple extent = step.cell.extent_um();
     step.axial_um = extent[0];
     step.transverse_um = extent[1];
@@ -76,32 +60,31 @@ class Stretcher {
 
  private:
   void apply(double vertex_force) {
-    auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), work_.applied);
+    auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), search_.applied());
     for (int k = 0; k < 2 * patch_; ++k) host(ends_[k], 0) = k < patch_ ? vertex_force : -vertex_force;
-    Kokkos::deep_copy(work_.applied, host);
+    Kokkos::deep_copy(search_.applied(), host);
   }
 
-  RelaxationLimits estimate_limits() {
-    const double undamped = membranes_.largest_stiffness_nN_per_um();
-    // Half the stable step at the present shape: links stiffen while the cell moves. A tenth of an edge a move keeps
-    // triangles from folding.
-    return {0.2 / std::sqrt(undamped), 1 / std::sqrt(undamped), 0.1 * edge_};
+  [[noreturn]] void overstretched(const StretchingStep& step) {
+    throw ComputationError(fmt::format(
+        "stretching: at {:.4g} pN the force is beyond what the model holds: {}, which none can pass; lower stretching.force_pN, raise "
+        "cells.0.shear_modulus_uN_per_m, or spread the force (stretching.patch_fraction)",
+        step.force_pN, stretch_text(membranes_.law(0), step.cell.stretch)));
   }
 
   [[noreturn]] void fail(const StretchingStep& step) {
     throw ComputationError(fmt::format(
-        "stretching: at {:.4g} pN the cell is not at rest after {} iterations: residual {:.3g}, wanted {:.3g}; largest "
-        "link {:.3f} of its contour length. Pull in more steps (stretching.steps), raise stretching.max_iterations or "
-        "stretching.tolerance, or lower stretching.force_pN",
-        step.force_pN, step.iterations, step.residual, settings_.tolerance, membranes_.diagnostics()[0].stretch));
+        "stretching: at {:.4g} pN the cell is not at rest after {} iterations: residual {:.3g}, wanted {:.3g}; {}. Pull in more "
+        "steps (stretching.steps), raise stretching.max_iterations or stretching.tolerance, or lower stretching.force_pN",
+        step.force_pN, step.iterations, step.residual, settings_.tolerance,
+        stretch_text(membranes_.law(0), membranes_.diagnostics()[0].stretch)));
   }
 
   Membranes& membranes_;
   const StretchingSettings& settings_;
   int patch_;
   std::vector<int> ends_;
-  RelaxationViews work_;
-  double edge_ = 0;
+  RestSearch search_;
 };
 
 void check_settings(const Membranes& membranes, const StretchingSettings& s) {

@@ -57,6 +57,7 @@ struct ExperimentComparison {
   int points = 0;       // within the range of forces computed
   int inside_both = 0;  // where both diameters lie within the error bars
   double rms_axial_um = 0, rms_transverse_um = 0;
+  double interpolation_um = 0;  // about the most by which the curve departs from the straight lines between computed forces
 };
 
 /// Differences at the experiment's forces, between which the computed curve is interpolated linearly.

@@ -98,10 +98,11 @@ void check_cell_size(const CellSettings& cell, const FileSurface& s) {
   const double largest = *std::max_element(s.extent_um.begin(), s.extent_um.end());
   if (largest >= least_cell_um && largest <= most_cell_um) return;
   const double factor = nearest_scale(largest, usual_cell_um), scale = factor * cell.scale;
-  refuse(cell.mesh, fmt::format("its largest extent is {:.3g} um{}, and a cell's is between {} and {} um; set cells.scale = {:g}{} "
+  const std::string key = constant_key(cell, "scale");
+  refuse(cell.mesh, fmt::format("its largest extent is {:.3g} um{}, and a cell's is between {} and {} um; set {} = {:g}{} "
                                 "to make it {:.3g} um",
-                                largest, cell.scale == 1 ? "" : fmt::format(" with cells.scale = {:g}", cell.scale),
-                                least_cell_um, most_cell_um, scale, unit_of_scale(scale), factor * largest));
+                                largest, cell.scale == 1 ? "" : fmt::format(" with {} = {:g}", key, cell.scale),
+                                least_cell_um, most_cell_um, key, scale, unit_of_scale(scale), factor * largest));
 }
 
 }  // namespace
@@ -119,17 +120,31 @@ const char* unit_of_scale(double scale) {
   return "";
 }
 
+/// @throws InputError  for a surface with handles, which is no cell's
+void check_cell_topology(const CellSettings& cell, FileSurface& s) {
+  constexpr int few = 100;
+  const int vertices = static_cast<int>(s.mesh.vertices.size()), triangles = static_cast<int>(s.mesh.triangles.size());
+  const int handles = (2 - vertices + triangles / 2) / 2;  // Euler: V - E + F = 2 - 2 handles, with three edges for two triangles
+  if (handles != 0)
+    refuse(cell.mesh, fmt::format("it has {} handle{}, like a ring, and a cell's membrane is a sphere pressed flat, without holes; give "
+                                  "a surface without",
+                                  handles, handles == 1 ? "" : "s"));
+  if (vertices < few)
+    s.warnings.push_back(fmt::format("{} vertices are too few for the shape of a cell: the built-in one has 200 at least", vertices));
+}
+
 FileSurface read_cell_surface(const CellSettings& cell) {
   FileSurface s = read_scaled(cell.mesh, cell.scale);
   check_cell_size(cell, s);
+  check_cell_topology(cell, s);
   const double angle = std::acos(std::clamp(s.axis[2], -1.0, 1.0)) / units::degree;
   constexpr double upright = 1;  // degrees: an uneven mesh's axis is not truer
   if (cell.recenter) {
     move_to_origin(s);
     if (off_centre(s))
-      s.notes.push_back(fmt::format("the centre of its volume, {} um in the file, goes to center_um (cells.recenter = false: the "
+      s.notes.push_back(fmt::format("the centre of its volume, {} um in the file, goes to center_um ({} = false: the "
                                     "file's origin does)",
-                                    text(s.centroid_um)));
+                                    text(s.centroid_um), constant_key(cell, "recenter")));
   } else if (off_centre(s)) {
     s.warnings.push_back(fmt::format("center_um is where the file's origin goes, and the centre of its volume lies {} um from it",
                                      text(s.centroid_um)));
@@ -139,8 +154,8 @@ FileSurface read_cell_surface(const CellSettings& cell) {
   } else if (angle > upright && cell.align) {
     s.mesh = turn_to_z(s.mesh, s.axis, {});
     s.warnings.push_back(fmt::format("it is a disc whose axis {} is {:.0f} degrees from the file's z: turned about the origin so "
-                                     "that cells.axis is the axis of the disc (cells.align = false: of the file's z)",
-                                     text(s.axis), angle));
+                                     "that cells.axis is the axis of the disc ({} = false: of the file's z)",
+                                     text(s.axis), angle, constant_key(cell, "align")));
   } else if (angle > upright) {
     s.warnings.push_back(fmt::format("cells.axis is where the file's z goes, and the axis of the disc, {}, is {:.0f} degrees from it",
                                      text(s.axis), angle));

@@ -57,10 +57,9 @@ Vec3 RevolvedShape::from_sphere(const Vec3& direction) const {
   return {m.r * direction.x / ring, m.r * direction.y / ring, m.z};
 }
 
-Vec3 RevolvedShape::project(const Vec3& point) const {
-  const double r = std::sqrt(point.x * point.x + point.y * point.y);
-  const double size = std::abs(point.z) + r;
-  const double entry = size > 0 ? 0.5 * (1 - point.z / size) * double(seen_.size() - 1) : 0;
+RevolvedShape::Latitude RevolvedShape::closest(double r, double z) const {
+  const double size = std::abs(z) + r;
+  const double entry = size > 0 ? 0.5 * (1 - z / size) * double(seen_.size() - 1) : 0;
   const std::size_t below = std::min(std::size_t(entry), seen_.size() - 2);
   const double part = entry - double(below);
   Latitude at = turned({seen_[below].sin + part * (seen_[below + 1].sin - seen_[below].sin),
@@ -69,16 +68,32 @@ Vec3 RevolvedShape::project(const Vec3& point) const {
   // Newton on the derivative of the squared distance, from the point in the same direction from the centre.
   for (int i = 0; i < 6; ++i) {
     const Meridian m = meridian(at);
-    const double slope = (m.r - r) * m.dr + (m.z - point.z) * m.dz;
-    const double curvature = m.dr * m.dr + m.dz * m.dz + (m.r - r) * m.ddr + (m.z - point.z) * m.ddz;
+    const double slope = (m.r - r) * m.dr + (m.z - z) * m.dz;
+    const double curvature = m.dr * m.dr + m.dz * m.dz + (m.r - r) * m.ddr + (m.z - z) * m.ddz;
     if (!(curvature > 0)) break;
     const double change = slope / curvature;
     at = turned(at, -change);
     if (std::abs(change) < 1e-8) break;  // squared, the error after the step
   }
-  const Meridian m = meridian(at);
+  return at;
+}
+
+Vec3 RevolvedShape::project(const Vec3& point) const {
+  const double r = std::sqrt(point.x * point.x + point.y * point.y);
+  const Meridian m = meridian(closest(r, point.z));
   if (r == 0) return {m.r, 0, m.z};
   return {m.r * point.x / r, m.r * point.y / r, m.z};
+}
+
+Vec3 RevolvedShape::to_sphere(const Vec3& point) const {
+  const double r = std::sqrt(point.x * point.x + point.y * point.y);
+  const Latitude at = closest(r, point.z);
+  const double entry = std::atan2(at.sin, at.cos) / pi * double(share_.size() - 1);
+  const std::size_t below = std::min(std::size_t(entry), share_.size() - 2);
+  const double share = share_[below] + (entry - double(below)) * (share_[below + 1] - share_[below]);
+  const double z = 1 - 2 * share, ring = std::sqrt(std::max(0.0, 1 - z * z));
+  if (r == 0) return {0, 0, z < 0 ? -1.0 : 1.0};
+  return {ring * point.x / r, ring * point.y / r, z};
 }
 
 RevolvedShape::Meridian BiconcaveShape::meridian(const Latitude& latitude) const {

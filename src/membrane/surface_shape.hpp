@@ -34,6 +34,9 @@ class RevolvedShape : public SurfaceShape {
   Vec3 from_sphere(const Vec3& direction) const override;
   Vec3 project(const Vec3& point) const override;
 
+  /// The direction that from_sphere() takes to the point of the surface closest to `point`.
+  Vec3 to_sphere(const Vec3& point) const;
+
  protected:
   struct Latitude {
     double sin, cos;  // of phi
@@ -47,6 +50,7 @@ class RevolvedShape : public SurfaceShape {
   void tabulate();
 
  private:
+  Latitude closest(double r, double z) const;
   static Latitude latitude(double phi) { return {std::sin(phi), std::cos(phi)}; }
   static Latitude turned(const Latitude& from, double angle);
 

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "core/error.hpp"
+#include "core/fingerprint.hpp"
 #include "output/checksum.hpp"
 #include "output/on_root.hpp"
 #include "output/report.hpp"
@@ -34,20 +35,97 @@ std::uint32_t stored_checksum(const Hdf5File& file, const std::string& name, con
   return checksum(shape, rows, values.data());
 }
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+std::string cells_attribute(int d) { return fmt::format("cells_{}", "ijk"[d]); }
+
+/// Numbers and texts of the header from a file that is a whole checkpoint of this format.
+CheckpointHeader header_of(const Hdf5File& file) {
+  CheckpointHeader header;
+  header.git = file.text("/", "git");
+  header.step = static_cast<long>(file.integer("/", "step"));
+  header.time_us = file.number("/", "time_us");
+  for (int d = 0; d < 3; ++d) header.cells[d] = static_cast<int>(file.integer("/", cells_attribute(d)));
+  header.resolved = file.read_text("case");
+  header.files = file.read_text("files");
+  header.run = file.read_text("run");
+  return header;
+}
+
+void seal_text(Fingerprint& seal, const std::string& name, const std::string& text) {
+  seal.add(name);
+  seal.add(text);
+}
+
+void seal_array(Fingerprint& seal, const std::string& name, const Shape& shape, std::int64_t sum) {
+  seal.add(name);
+  seal.add(shape.data(), shape.size() * sizeof shape[0]);
+  seal.add(&sum, sizeof sum);
+}
+
+/// Fingerprint of all that a checkpoint says but its arrays' entries, whose checksums it covers.
+std::string seal_of(const CheckpointHeader& header, const Fingerprint& texts, const Fingerprint& arrays) {
+  Fingerprint seal;
+  seal.add(header.git);
+  const std::int64_t numbers[] = {header.step, header.cells[0], header.cells[1], header.cells[2]};
+  seal.add(numbers, sizeof numbers);
+  seal.add(&header.time_us, sizeof header.time_us);
+  const std::uint64_t parts[] = {texts.value(), arrays.value()};
+  seal.add(parts, sizeof parts);
+  return fmt::format("{:016x}", seal.value());
+}
+
+std::string seal_of(const Hdf5File& file) {
+  Fingerprint texts, arrays;
+  for (const auto& name : lines_of(file.read_text("texts"))) seal_text(texts, name, file.read_text(name));
+  for (const auto& name : lines_of(file.read_text("arrays")))
+    seal_array(arrays, name, file.shape(name), file.integer(name, "checksum"));
+  return seal_of(header_of(file), texts, arrays);
+}
+
+void require_checkpoint(const Hdf5File& file) {
+  const auto& path = file.path();
+  if (!file.has_attribute("/", "format") || file.text("/", "format") != format_name)
+    throw InputError(fmt::format("{}: this HDF5 file is not a checkpoint of Corpuscle", path));
+  const auto version = file.integer("/", "version");
+  if (version != CheckpointHeader::format_version)
+    throw InputError(fmt::format("{}: this checkpoint has format version {}, and this program reads version {}: it was written by "
+                                 "another version of the program, with which it can be gone on from; or run the case anew",
+                                 path, version, CheckpointHeader::format_version));
+  if (!file.has_attribute("/", "complete"))
+    throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
+  if (!file.has_attribute("/", "seal") || file.text("/", "seal") != seal_of(file))
+    throw InputError(fmt::format("{}: its header (time, step, case and the like) is damaged: it is not what was written; use "
+                                 "another checkpoint", path));
+}
 
 }  // namespace
 
+CheckpointHeader read_checkpoint_header(const std::string& path) {
+  const auto file = Hdf5File::read(path);
+  require_checkpoint(file);
+  return header_of(file);
+}
+
 CheckpointWriter::CheckpointWriter(std::string path, const Comm& comm, const CheckpointHeader& header)
-    : path_(std::move(path)), temporary_(path_ + ".part"), comm_(comm) {
+    : path_(std::move(path)), temporary_(path_ + ".part"), header_(header), comm_(comm) {
+  header_.git = git_hash();
   file_ = std::make_unique<Hdf5File>(Hdf5File::create(temporary_, comm_));
   file_->attribute("/", "format", format_name);
   file_->attribute("/", "version", static_cast<std::int64_t>(CheckpointHeader::format_version));
-  file_->attribute("/", "git", git_hash());
+  file_->attribute("/", "git", header_.git);
   file_->attribute("/", "step", static_cast<std::int64_t>(header.step));
   file_->attribute("/", "time_us", header.time_us);
   for (int d = 0; d < 3; ++d)
-    file_->attribute("/", fmt::format("cells_{}", "ijk"[d]), static_cast<std::int64_t>(header.cells[d]));
-  file_->write_text("case", header.resolved);
+    file_->attribute("/", cells_attribute(d), static_cast<std::int64_t>(header.cells[d]));
+  add_text("case", header.resolved);
+  add_text("files", header.files);
+  add_text("run", header.run);
 }
 
 CheckpointWriter::~CheckpointWriter() {
@@ -60,16 +138,20 @@ CheckpointWriter::~CheckpointWriter() {
 template <class T>
 void CheckpointWriter::add_whole(const std::string& name, const Shape& shape, const T* values) {
   file_->write(name, shape, values);
-  file_->attribute(name, "checksum", static_cast<std::int64_t>(checksum(shape, whole_of(shape), values)));
-  names_ += name + "\n";
+  list_array(name, shape, checksum(shape, whole_of(shape), values));
 }
 
 template <class T>
 void CheckpointWriter::add_part(const std::string& name, const Shape& shape, const Slab& mine, const T* values) {
   file_->write(name, shape, mine, values);
   const auto sum = sum_over_ranks(comm_, checksum(shape, mine, values));
-  file_->attribute(name, "checksum", static_cast<std::int64_t>(sum));
-  names_ += name + "\n";
+  list_array(name, shape, sum);
+}
+
+void CheckpointWriter::list_array(const std::string& name, const Shape& shape, std::int64_t sum) {
+  file_->attribute(name, "checksum", sum);
+  seal_array(array_seal_, name, shape, sum);
+  arrays_ += name + "\n";
 }
 
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const double* values) {
@@ -85,10 +167,16 @@ void CheckpointWriter::add(const std::string& name, const Shape& shape, const Sl
   add_part(name, shape, mine, values);
 }
 
-void CheckpointWriter::add_text(const std::string& name, const std::string& text) { file_->write_text(name, text); }
+void CheckpointWriter::add_text(const std::string& name, const std::string& text) {
+  file_->write_text(name, text);
+  seal_text(text_seal_, name, text);
+  texts_ += name + "\n";
+}
 
 void CheckpointWriter::commit() {
-  file_->write_text("arrays", names_);
+  file_->write_text("arrays", arrays_);
+  file_->write_text("texts", texts_);
+  file_->attribute("/", "seal", seal_of(header_, text_seal_, array_seal_));
   file_->attribute("/", "complete", std::int64_t{1});
   file_->close();
   on_root(comm_, [&] {
@@ -102,23 +190,9 @@ void CheckpointWriter::commit() {
 }
 
 CheckpointReader::CheckpointReader(const std::string& path, const Comm& comm) : file_(Hdf5File::read(path)) {
-  if (!file_.has_attribute("/", "format") || file_.text("/", "format") != format_name)
-    throw InputError(fmt::format("{}: this HDF5 file is not a checkpoint of Corpuscle", path));
-  const auto version = file_.integer("/", "version");
-  if (version != CheckpointHeader::format_version)
-    throw InputError(fmt::format("{}: this checkpoint has format version {}, and this program reads version {}: it was written by "
-                                 "another version of the program, with which it can be gone on from; or run the case anew",
-                                 path, version, CheckpointHeader::format_version));
-  if (!file_.has_attribute("/", "complete"))
-    throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
-  header_.git = file_.text("/", "git");
-  header_.step = static_cast<long>(file_.integer("/", "step"));
-  header_.time_us = file_.number("/", "time_us");
-  for (int d = 0; d < 3; ++d)
-    header_.cells[d] = static_cast<int>(file_.integer("/", fmt::format("cells_{}", "ijk"[d])));
-  header_.resolved = file_.read_text("case");
-  std::istringstream names(file_.read_text("arrays"));
-  for (std::string name; std::getline(names, name);) check(name, comm);
+  require_checkpoint(file_);
+  header_ = header_of(file_);
+  for (const auto& name : lines_of(file_.read_text("arrays"))) check(name, comm);
 }
 
 /// The ranks share the array's rows. A rank that cannot read its own counts as a wrong sum, so that all ranks stop.

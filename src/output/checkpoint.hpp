@@ -6,19 +6,26 @@
 #include <array>
 #include <memory>
 
+#include "core/fingerprint.hpp"
 #include "output/hdf5_file.hpp"
 
 namespace corpuscle {
 
 struct CheckpointHeader {
-  static constexpr int format_version = 3;
+  static constexpr int format_version = 4;
 
   std::string git;             // hash of the program that wrote it; filled in by the writer
   std::string resolved;        // the case, every key with the value used
+  std::string files;           // fingerprints of the files that the case names (app/scene_files.hpp)
+  std::string run;             // of which run this is a state (RunFolder)
   std::array<int, 3> cells{};  // of the whole grid; zero without a fluid
   long step = 0;
   double time_us = 0;
 };
+
+/// The header alone, without the arrays; every rank may call.
+/// @throws InputError  as CheckpointReader does, but for damage to arrays
+CheckpointHeader read_checkpoint_header(const std::string& path);
 
 /// Writes under another name until commit(), so the last good checkpoint survives whatever happens before.
 class CheckpointWriter {
@@ -50,8 +57,12 @@ class CheckpointWriter {
   void add_whole(const std::string& name, const Shape& shape, const T* values);
   template <class T>
   void add_part(const std::string& name, const Shape& shape, const Slab& mine, const T* values);
+  void list_array(const std::string& name, const Shape& shape, std::int64_t sum);
 
-  std::string path_, temporary_, names_;  // names of the arrays so far, a line each
+  std::string path_, temporary_;
+  CheckpointHeader header_;
+  std::string arrays_, texts_;  // names so far, a line each
+  Fingerprint array_seal_, text_seal_;
   Comm comm_;
   std::unique_ptr<Hdf5File> file_;
 };
@@ -59,7 +70,8 @@ class CheckpointWriter {
 /// Each rank reads what it needs; all find the same faults.
 class CheckpointReader {
  public:
-  /// Opens the file and checks every array against its checksum; collective.
+  /// Opens the file and checks all that is in it: every array against its checksum, and everything else, those checksums
+  /// included, against the file's seal; collective.
   /// @throws InputError  the file is missing, not HDF5, cut short, foreign, unfinished, damaged, or of another format
   ///                     version
   explicit CheckpointReader(const std::string& path, const Comm& comm = Comm());

@@ -101,7 +101,10 @@ Hdf5File::~Hdf5File() {
 Hdf5File Hdf5File::create(const std::string& path, const Comm& comm) { return {path, create_file(path, &comm), &comm}; }
 Hdf5File Hdf5File::create(const std::string& path) { return {path, create_file(path, nullptr), nullptr}; }
 
-Hdf5File Hdf5File::read(const std::string& path) {
+Hdf5File Hdf5File::read(const std::string& path) { return open(path, H5F_ACC_RDONLY); }
+Hdf5File Hdf5File::append(const std::string& path) { return open(path, H5F_ACC_RDWR); }
+
+Hdf5File Hdf5File::open(const std::string& path, unsigned how) {
   be_quiet();
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) throw InputError(fmt::format("{}: there is no such file", path));
@@ -110,7 +113,7 @@ Hdf5File Hdf5File::read(const std::string& path) {
   if (is_hdf5 < 0) throw InputError(fmt::format("{}: cannot read this file: {}", path, reason()));
   if (is_hdf5 == 0) throw InputError(fmt::format("{}: this is not an HDF5 file, or less than its beginning", path));
   const Handle access(access_list(nullptr), H5Pclose);
-  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
+  const hid_t file = H5Fopen(path.c_str(), how, access);
   if (file < 0) throw InputError(fmt::format("{}: this HDF5 file is cut short or damaged: {}", path, reason()));
   return {path, file, nullptr};
 }

@@ -37,6 +37,9 @@ class Hdf5File {
   /// For reading, by each rank on its own.
   /// @throws InputError  the file is missing, empty, not HDF5, or cut short
   static Hdf5File read(const std::string& path);
+  /// To add to what is there, by one rank alone.
+  /// @throws InputError  as above, or somebody else has it open
+  static Hdf5File append(const std::string& path);
 
   Hdf5File(Hdf5File&& other) noexcept;
   Hdf5File& operator=(Hdf5File&&) = delete;
@@ -87,6 +90,7 @@ class Hdf5File {
 
  private:
   Hdf5File(std::string path, hid_t file, const Comm* comm);
+  static Hdf5File open(const std::string& path, unsigned how);
   void require_space(const std::string& name, double bytes) const;
   void write_slab(const std::string& name, const Shape& shape, const Slab* mine, hid_t type, const void* data,
                   const Shape& memory);

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <vector>
 
 #include "core/error.hpp"
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* lock_name = ".corpuscle.lock";
+constexpr const char* run_name = ".corpuscle.run";
 const std::vector<std::string> result_files = {"report.json", "history.csv", "fields.h5",    "fields.xdmf",
                                                "cells.h5",    "cells.xdmf",  "checkpoint.h5"};
 
@@ -30,6 +32,22 @@ std::string first_result(const fs::path& folder) {
   for (const auto& name : result_files)
     if (fs::exists(folder / name)) return name;
   return "";
+}
+
+std::string new_run() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}{:08x}", random(), random(), random());
+}
+
+/// What lies in a folder: the name of its run, and where that one began, if at a checkpoint of another.
+struct RunLabel {
+  std::string run, from;
+  long step = -1;
+  explicit RunLabel(const fs::path& folder) { std::ifstream(folder / run_name) >> run >> from >> step; }
+};
+
+std::string label_text(const std::string& run, const Continued& from) {
+  return fmt::format("{}\n{} {}\n", run, from.run, from.step);
 }
 
 std::string this_host() {
@@ -44,8 +62,9 @@ void remove_results(const std::string& folder) {
   std::error_code ignored;
   for (const auto& name : result_files) {
     fs::remove(fs::path(folder) / name, ignored);
-    fs::remove(fs::path(folder) / (name + ".part"), ignored);
+    for (const char* unfinished : {".part", ".old"}) fs::remove(fs::path(folder) / (name + unfinished), ignored);
   }
+  fs::remove(fs::path(folder) / run_name, ignored);
   for (const char* series : {"fields", "cells"}) {
     const auto inner = fs::path(folder) / series;
     if (!fs::is_directory(inner, ignored)) continue;
@@ -67,10 +86,12 @@ void remove_results(const std::string& folder) {
   }
 }
 
-RunFolder::RunFolder(const Comm& comm, const std::string& named, const std::string& case_name, EarlierResults earlier)
+RunFolder::RunFolder(const Comm& comm, const std::string& named, const std::string& case_name, EarlierResults earlier,
+                     const std::optional<Continued>& continued)
     : comm_(comm), earlier_(earlier) {
-  on_root(comm_, [&] { claim(named, case_name); });
+  on_root(comm_, [&] { claim(named, case_name, continued); });
   comm_.broadcast(path_);
+  comm_.broadcast(run_);
 }
 
 RunFolder::~RunFolder() {
@@ -87,7 +108,7 @@ void RunFolder::give_back() {
   for (fs::path folder = path_; fs::remove(folder, ignored) && folder != first_made_;) folder = folder.parent_path();
 }
 
-void RunFolder::claim(const std::string& named, const std::string& case_name) {
+void RunFolder::claim(const std::string& named, const std::string& case_name, const std::optional<Continued>& continued) {
   try {
     if (named.empty())
       make_numbered(case_name);
@@ -99,10 +120,34 @@ void RunFolder::claim(const std::string& named, const std::string& case_name) {
       throw InputError(fmt::format("--out {}: holds the results of an earlier run ({}): choose another folder, write over them with "
                                    "--overwrite, or go on from them with --restart {}/checkpoint.h5",
                                    path_, result, path_));
+    run_ = new_run();
+    label_ = run_ + "\n";
+    if (continued) settle_run(*continued);
   } catch (const InputError&) {
     give_back();
     throw;
   }
+}
+
+/// A restart goes on in a folder without results, or in that of the checkpoint's run: the two names are the same, or the
+/// folder's run began at this very checkpoint. Without a name, as in a copy, the checkpoint must lie in the folder.
+void RunFolder::settle_run(const Continued& continued) {
+  label_ = label_text(run_, continued);
+  std::error_code ignored;
+  const auto result = first_result(path_);
+  const bool here = fs::equivalent(path_, fs::absolute(continued.checkpoint, ignored).parent_path(), ignored);
+  if (earlier_ == EarlierResults::overwrite && here)
+    throw InputError(fmt::format("--overwrite would remove {} before the run goes on from it: leave out --overwrite, or choose "
+                                 "another folder with --out", continued.checkpoint));
+  if (result.empty() || earlier_ == EarlierResults::overwrite) return;
+  const RunLabel label(path_);
+  const bool began_here = label.from == continued.run && label.step == continued.step;
+  if (label.run.empty() ? !here : label.run != continued.run && !began_here)
+    throw InputError(fmt::format("--out {}: holds the results of another run ({}) than {} is of: choose another folder, go on "
+                                 "from its own {}/checkpoint.h5, or write over them with --overwrite",
+                                 path_, result, continued.checkpoint, path_));
+  run_ = label.run.empty() ? continued.run : label.run;
+  label_ = label.run.empty() ? label_text(run_, continued) : "";
 }
 
 void RunFolder::make(const std::string& path) {
@@ -177,6 +222,7 @@ void RunFolder::point_latest() const {
 void RunFolder::begin() {
   on_root(comm_, [&] {
     if (earlier_ == EarlierResults::overwrite) remove_results(path_);
+    if (!label_.empty()) replace_text_file((fs::path(path_) / run_name).string(), label_);
     if (numbered_) point_latest();
   });
   begun_ = true;

@@ -24,6 +24,8 @@ constexpr const char* xdmf_end = "  </Grid>\n </Domain>\n</Xdmf>\n";
 
 bool is_step(const std::string& name) { return name.rfind("step_", 0) == 0; }
 
+bool before(const StoredTime& a, const StoredTime& b) { return a.group < b.group; }
+
 /// Whole ones, and what a killed run had begun.
 std::vector<fs::path> files_of_steps(const std::string& folder) {
   std::vector<fs::path> paths;
@@ -52,6 +54,8 @@ Series::Series(const std::string& folder, const std::string& name, const std::st
     : folder_((fs::path(folder) / name).string()),
       name_(name),
       format_(format),
+      index_(folder_ + ".h5"),
+      xdmf_(folder_ + ".xdmf"),
       comm_(comm),
       shared_file_(shared_file),
       shared_(shared),
@@ -69,14 +73,14 @@ void Series::create() {
 
 bool Series::exists() const {
   std::string there;
-  if (comm_.root() && fs::exists(index_path())) there = "yes";
+  if (comm_.root() && fs::exists(index_.path())) there = "yes";
   comm_.broadcast(there);
   return !there.empty();
 }
 
 void Series::resume(double last_us) {
   on_root(comm_, [&] {
-    stored_times(index_path(), format_);
+    stored_times(index_.path(), format_);
     // The files themselves: a run that was killed may have stored one more time than it had listed.
     times_.clear();
     std::vector<fs::path> others;
@@ -89,7 +93,7 @@ void Series::resume(double last_us) {
       else
         others.push_back(path);
     }
-    std::sort(times_.begin(), times_.end(), [](const auto& a, const auto& b) { return a.group < b.group; });
+    std::sort(times_.begin(), times_.end(), before);
     write_index();
     rewrite_xdmf();
     for (const auto& path : others) fs::remove(path);
@@ -114,29 +118,49 @@ void Series::finish(long step, double time_us) {
   on_root(comm_, [&] {
     const StoredTime time{step_group(step), time_us};
     put_in_place(time.group);
-    const bool again =
-        std::any_of(times_.begin(), times_.end(), [&](const StoredTime& t) { return t.group == time.group; });
-    if (!again) times_.push_back(time);
-    write_index();
-    if (again)
+    const auto at = std::lower_bound(times_.begin(), times_.end(), time, before);
+    if (at != times_.end() && at->group == time.group) {
+      write_index();
       rewrite_xdmf();
-    else
-      append_xdmf(time);
+      return;
+    }
+    times_.push_back(time);
+    append_index();
+    append_xdmf();
   });
 }
 
 /// Links only, so that writing it anew costs little however large the arrays are.
-void Series::write_index() const {
-  const auto temporary = index_path() + unfinished;
-  auto index = Hdf5File::create(temporary);
+void Series::write_index() {
+  auto index = Hdf5File::create(index_.spare());
   index.attribute("/", "format", format_);
   index.attribute("/", "git", git_hash());
   for (const auto& array : shared_) index.link(array, name_ + "/" + shared_file_ + ".h5", "/" + array);
   for (const auto& time : times_) index.link(time.group, name_ + "/" + time.group + ".h5", "/");
   index.close();
-  std::error_code error;
-  fs::rename(temporary, index_path(), error);
-  if (error) throw ComputationError(fmt::format("{}: cannot put this file in place: {}", index_path(), error.message()));
+  index_.put_in_place(false);
+}
+
+void Series::append_index() {
+  const auto add = [&] {
+    auto index = Hdf5File::append(index_.spare());
+    for (std::size_t n = indexed_; n < times_.size(); ++n)
+      index.link(times_[n].group, name_ + "/" + times_[n].group + ".h5", "/");
+    index.close();
+  };
+  const auto copy = [&] {
+    index_.copy();
+    indexed_ = times_.size() - 1;
+  };
+  if (!index_.has_spare()) copy();
+  try {
+    add();
+  } catch (const InputError&) {  // somebody has it open
+    copy();
+    add();
+  }
+  index_.put_in_place(true);
+  indexed_ = times_.size() - 1;
 }
 
 std::string Series::grid_text(const StoredTime& time) const {
@@ -151,20 +175,31 @@ void Series::rewrite_xdmf() {
       name_);
   for (const auto& time : times_) text += grid_text(time);
   xdmf_length_ = text.size();
-  replace_text_file(folder_ + ".xdmf", text + xdmf_end);
+  xdmf_text_.clear();
+  TextFile file(xdmf_.spare());
+  file.write(text + xdmf_end);
+  file.close();
+  xdmf_.put_in_place(false);
 }
 
-/// The new time over the file's end, and the end after it, in one write: its cost does not grow with the times before.
-void Series::append_xdmf(const StoredTime& time) {
-  const auto path = folder_ + ".xdmf", text = grid_text(time), whole = text + xdmf_end;
+/// The times that the second file lacks over its end, and the end after them.
+void Series::append_xdmf() {
+  if (!xdmf_.has_spare()) {
+    xdmf_.copy();
+    xdmf_length_ += xdmf_text_.size();
+    xdmf_text_.clear();
+  }
+  const auto text = grid_text(times_.back()), whole = xdmf_text_ + text + xdmf_end;
+  const auto& path = xdmf_.spare();
   std::FILE* file = std::fopen(path.c_str(), "r+");
-  const bool written = file && std::setvbuf(file, nullptr, _IOFBF, whole.size() + 1) == 0 &&
-                       std::fseek(file, static_cast<long>(xdmf_length_), SEEK_SET) == 0 &&
-                       std::fwrite(whole.data(), 1, whole.size(), file) == whole.size() && std::fflush(file) == 0;
+  const bool written = file && std::fseek(file, static_cast<long>(xdmf_length_), SEEK_SET) == 0 &&
+                 std::fwrite(whole.data(), 1, whole.size(), file) == whole.size() && std::fflush(file) == 0;
   const int why = errno;
   if (file) std::fclose(file);
   if (!written) throw ComputationError(fmt::format("{}: writing failed: {}", path, std::strerror(why)));
-  xdmf_length_ += text.size();
+  xdmf_.put_in_place(true);
+  xdmf_length_ += xdmf_text_.size();
+  xdmf_text_ = text;
 }
 
 std::string xdmf_item(const std::string& file, const std::string& data_set, const Shape& shape, const char* number,

@@ -1,6 +1,7 @@
 // What the two time series, fields and cells, have in common. Each stored time is a file of its own below
-// <name>/, complete before it gets its name; <name>.h5 links them together, and <name>.xdmf lists them for ParaView. So
-// whatever a run was doing when it ended, all that it had stored can be read, and a restart goes on from it.
+// <name>/, complete before it gets its name; <name>.h5 links them together, and <name>.xdmf lists them for ParaView: both
+// are growing files, to which a time is added at a cost that does not depend on how many there are. So whatever a run was
+// doing when it ended, all that it had stored can be read, and a restart goes on from it.
 #pragma once
 
 #ifdef CORPUSCLE_HDF5
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "output/growing_file.hpp"
 #include "output/hdf5_file.hpp"
 
 namespace corpuscle {
@@ -60,20 +62,23 @@ class Series {
 
  private:
   std::string path(const std::string& file) const { return folder_ + "/" + file + ".h5"; }
-  std::string index_path() const { return folder_ + ".h5"; }
   void put_in_place(const std::string& file) const;
   std::string grid_text(const StoredTime& time) const;
-  void write_index() const;
+  void write_index();
+  void append_index();
   void rewrite_xdmf();
-  void append_xdmf(const StoredTime& time);
+  void append_xdmf();
 
   std::string folder_, name_, format_;
+  GrowingFile index_, xdmf_;
   Comm comm_;
   std::string shared_file_;
   std::vector<std::string> shared_;
   Describe describe_;
   std::vector<StoredTime> times_;  // rank 0 only
-  std::size_t xdmf_length_ = 0;    // of the .xdmf, without its end
+  std::size_t indexed_ = 0;        // of them, in the second index
+  std::string xdmf_text_;          // of the last time, which the second .xdmf lacks
+  std::size_t xdmf_length_ = 0;    // of the second .xdmf, without its end
 };
 
 /// A <DataItem> that refers to a data set. `number` is "Float", "Int" or "Char".

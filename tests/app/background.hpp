@@ -19,6 +19,7 @@ class Background {
     process_ = ::fork();
     if (process_ == 0) {
       ::setpgid(0, 0);
+      for (const int signal : {SIGHUP, SIGINT, SIGTERM, SIGUSR1}) ::signal(signal, SIG_DFL);  // the tests may run under nohup
       ::execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
       ::_exit(127);
     }
@@ -29,9 +30,9 @@ class Background {
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
 
-  /// Wait until the condition holds. @return false if the run ended before, or after a minute
-  bool wait_until(const std::function<bool()>& condition) {
-    const auto end = Clock::now() + std::chrono::seconds(60);
+  /// Wait until the condition holds. @return false if the run ended before, or after that time
+  bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds longest = std::chrono::minutes(1)) {
+    const auto end = Clock::now() + longest;
     while (Clock::now() < end) {
       if (condition()) return true;
       if (ended()) return condition();

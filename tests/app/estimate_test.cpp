@@ -42,6 +42,15 @@ TEST_CASE("error bars of a stretched cell hold the finer answer") {
   for (const char* name : {"axial_um", "transverse_um"}) require_within_bar(report(folder / "coarse"), name, fine[name]);
 }
 
+TEST_CASE("error bars of a cell with a type coarsen the type") {
+  const auto folder = fresh_folder("bars_of_type");
+  std::ofstream(folder / "typed.toml") << "[[cell_types]]\nname = \"ball\"\nshape = \"sphere\"\nradius_um = 3\nvertices = 200\n"
+                                          "[[cells]]\ntype = \"ball\"\n[stretching]\nforce_pN = 10\nsteps = 1\n";
+  const auto outcome = succeed(folder, {"run", "typed.toml", "--out", "out", "--estimate-error=vertices"});
+  REQUIRE_THAT(outcome.output, Contains("the same with cell_types.0.vertices=100"));
+  REQUIRE(report(folder / "out")["error_bars"].contains("axial_um"));
+}
+
 TEST_CASE("a coarser run that fails costs the error bars, not the run") {
   const auto folder = fresh_folder("bars_that_fail");
   // 1.1 um from the wall: more than one spacing of the case's grid, less than one of the coarser.

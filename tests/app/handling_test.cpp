@@ -127,6 +127,7 @@ TEST_CASE("a run killed at twenty moments: all that it has written opens, and it
     INFO("kill " << killed << ": " << contents(folder / "screen.txt"));
     CHECK(read_all(folder / "parts/fields.h5") >= 1);
     CHECK(read_all(folder / "parts/cells.h5") >= 1);
+    for (const char* name : {"fields.xdmf", "cells.xdmf"}) CHECK_THAT(contents(folder / "parts" / name), Catch::EndsWith("</Xdmf>\n"));
     if (lines(folder / "parts/history.csv") > 3 * kills) break;
   }
   CHECK(killed > 5);

@@ -167,6 +167,20 @@ TEST_CASE("check and run say what a surface file holds") {
     CHECK_THAT(said, Contains(part));
 }
 
+TEST_CASE("check lists cell types with their laws and numbers, and what a sheet on a spheroid has come to") {
+  const auto folder = fresh_folder("types");
+  std::ofstream(folder / "types.toml") << contents(scene("straight_tube"))
+                                       << "\n[[cell_types]]\nname = \"rbc\"\nvertices = 300\nreference = \"spheroid\"\n"
+                                          "[[cell_types]]\nname = \"capsule\"\nshape = \"sphere\"\nradius_um = 2\nlaw = \"skalak\"\n"
+                                          "skalak_c = 10\nbending_modulus_J = 0\n"
+                                          "[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, 10]\n[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, -10]\n";
+  const auto said = succeed(folder, with({"check", "types.toml"}, {"grid.nodes=[17,17,25]"})).output;
+  for (const char* part : {"cell type \"rbc\": 300 vertices, biconcave, 7.82 um wide; wlc-pow, shear modulus 6.32 uN/m; 2 cells",
+                           "cell type \"capsule\": 500 vertices, a sphere of radius 2 um; skalak, C = 10, shear modulus 6.32 uN/m; 0 cells",
+                           "cells with keys of their own: 1", "cell_types.0.reference on a spheroid of reduced volume 0.95: at rest after"})
+    CHECK_THAT(said, Contains(part));
+}
+
 TEST_CASE("scenes that cannot be are refused before anything runs") {
   const auto folder = fresh_folder("scenes");
   const auto tube = [&](const Words& settings) {

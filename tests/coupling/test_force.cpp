@@ -5,6 +5,7 @@
 
 #include "core/error.hpp"
 #include "coupling/energy_balance.hpp"
+#include "immersed/surface_geometry.hpp"
 #include "scenes.hpp"
 
 using namespace corpuscle;
@@ -132,6 +133,31 @@ TEST_CASE("steps too long for a membrane are refused, and the longest that is no
   const Run r = run(scene);
   CHECK(r.cell.area_um2 == Approx(r.cell.rest_area_um2).epsilon(0.05));
   CHECK(r.cell.stretch < 0.6);
+}
+
+TEST_CASE("the fastest relaxation is that of the stiffest of several laws", "[coupling][force]") {
+  using Law = CellSettings::Law;
+  const MobilityModel model{1.2, 0.4, 0.1};
+  const auto fastest = [&](const std::vector<Law>& laws) {
+    std::vector<CellSettings> cells;
+    for (Law law : laws) {
+      CellSettings cell;
+      cell.vertices = 300;
+      cell.law = law;
+      cell.shear_modulus_uN_per_m = law == Law::neo_hookean ? 20 : law == Law::skalak ? 10 : 5;
+      if (law != Law::wlc_pow) cell.area_modulus_uN_per_m = cell.local_area_modulus_uN_per_m = 0;
+      cell.center_um = {0, 0, 10.0 * static_cast<double>(cells.size())};
+      cells.push_back(cell);
+    }
+    Membranes membranes(cells);
+    update_surface_geometry(membranes.surfaces());
+    return membranes.fastest_relaxation_per_us(model);
+  };
+  const double springs = fastest({Law::wlc_pow}), skalak = fastest({Law::skalak}), neo_hookean = fastest({Law::neo_hookean});
+  CHECK(springs != Approx(skalak).epsilon(0.05));
+  // The same cells twice, and elsewhere: round-off of positions, in differences of forces over 1e-4 um.
+  CHECK(fastest({Law::skalak, Law::neo_hookean, Law::wlc_pow, Law::skalak}) ==
+        Approx(std::max({springs, skalak, neo_hookean})).epsilon(1e-6));
 }
 
 TEST_CASE("a cell beyond a wall is refused by name", "[coupling][force]") {

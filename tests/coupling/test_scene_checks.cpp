@@ -99,6 +99,38 @@ TEST_CASE("prescribed velocities must conserve volume", "[ranks]") {
   }
 }
 
+TEST_CASE("changes of the inflow that no step sees are refused") {
+  const auto found = [](const std::vector<std::array<double, 2>>& table, const TimeSettings& time = {2, 20}) {
+    auto sides = between(Type::velocity_inlet, Type::outflow);
+    sides[4].speed = 2e-3, sides[4].time_table = table;
+    try {
+      check_courses(sides, StepSchedule(time, sudden_changes(sides, time.step_us)));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  CHECK_THAT(found({{0, 0}, {2.1, 0}, {3, 50}, {3.9, 0}, {100, 0}}),
+             Contains("boundary.4.time_table: row 2 (3 us, factor 50)") && Contains("time.step_us") && Contains("0.45 us"));
+  CHECK(found({{0, 0}, {2.1, 0}, {3, 50}, {3.9, 0}, {100, 0}}, {0.25, 20}) == "accepted");
+  CHECK_THAT(found({{0, 1}, {2.1, 1}, {3, 0}, {3.9, 1}, {100, 1}}), Contains("row 2 (3 us, factor 0)"));
+  // A jump, which the step after it has; a course that the steps sample; and what comes after the end.
+  CHECK(found({{0, 0}, {3, 0}, {3.001, 1}, {100, 1}}) == "accepted");
+  CHECK(found({{0, 0}, {5, 0.5}, {10, 1}, {15, 0.5}, {20, 0}}) == "accepted");
+  CHECK(found({{0, 0}, {10, 1}, {30, 1}, {30.1, 9}, {30.2, 1}}) == "accepted");
+  CHECK_THAT(found({{0, 0}, {1e-5, 0.5}, {2e-5, 1}}), Contains("boundary.4.time_table") && Contains("within the first step") && Contains("1e6"));
+}
+
+TEST_CASE("a pressure gradient must point along the periodic sides' shift") {
+  const NodeSource source{{4, 4, 4}, [](int i, int j, int k) { return Triple{double(i) + 0.5 * k, double(j), double(k)}; }};
+  const Grid grid(Comm(), source, {false, false, true});
+  CHECK_NOTHROW(check_pressure_gradient(grid, {0, 0, 0}));
+  CHECK_NOTHROW(check_pressure_gradient(grid, {-0.5, 0, -1}));
+  CHECK_THROWS_WITH(check_pressure_gradient(grid, {0, -1, 0}), Contains("fluid.pressure_gradient_Pa_per_um") && Contains("drives nothing"));
+  // (0, 0, -1.25) has the same part along (0.5, 0, 1) as (-0.5, 0, -1).
+  CHECK_THROWS_WITH(check_pressure_gradient(grid, {0, 0, -1.25}), Contains("the same flow comes from [-0.5, 0, -1]"));
+}
+
 TEST_CASE("a moving wall must not move through itself", "[ranks]") {
   auto lid = between(Type::wall, Type::moving_wall);
   lid[5].velocity = Triple{2e-3, -1e-3, 0};

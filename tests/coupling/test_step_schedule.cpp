@@ -107,6 +107,16 @@ TEST_CASE("an end that is no whole number of steps is refused", "[coupling]") {
   CHECK_THROWS_WITH(StepSchedule({4, 42, 1}), Catch::Contains("time.end_us") && Catch::Contains("use 4"));
 }
 
+TEST_CASE("steps that cannot be counted are refused, and first steps that would have to be longer than asked", "[coupling]") {
+  using Catch::Contains;
+  CHECK_THROWS_WITH(StepSchedule({1, 1e300, 0}), Contains("time.end_us = 1e+300") && Contains("raise time.step_us"));
+  CHECK_THROWS_WITH(StepSchedule({1e-300, 1, 0}), Contains("1e-300 us") && Contains("raise time.step_us"));
+  CHECK_THROWS_WITH(StepSchedule({4, 400, 1e-6}), Contains("time.first_step_us = 1e-06") && Contains("least"));
+  CHECK_THROWS_WITH(StepSchedule({4, 4e12, 1e-4}), Contains("4e+16 steps of 0.0001 us") && Contains("time.first_step_us"));
+  CHECK(StepSchedule({4, 400, 4.0 / (1 << 20)}).lengths_us().size() == 21);
+  CHECK(StepSchedule({1, 1e15, 0}).end() == 1000000000000000);
+}
+
 TEST_CASE("short first steps take out the error of the start", "[coupling]") {
   const auto scene = scenes::tube_with_cell(17, 25, 100, CouplingSettings::Scheme::robin, 120);
   const auto reference = after(scene, 1, 0.25);

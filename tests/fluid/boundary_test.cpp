@@ -92,6 +92,44 @@ TEST_CASE("inlet profiles have their shapes", "[fluid]") {
       CHECK(u(index.cell(5, j, -1), 2) == u(index.cell(0, j, -1), 2));
     }
   }
+  SECTION("parabolic in a duct is flat where a side is symmetric") {
+    all[4].profile = Profile::parabolic;
+    all[0].type = Type::symmetry;
+    all[2].type = all[3].type = Type::symmetry;
+    Filled scene(box({10, 6, 6}, {2, 4, 3}), all, open);
+    scene.fill(1);
+    const auto u = on_host(scene.u);
+    const IndexSpace& index = scene.grid.index();
+    for (int i = 0; i < 10; ++i) {
+      const double x = (i + 0.5) / 10;
+      // The mid-point mean of 1 - x^2 from 0 to 1 over ten cells is 2/3 + 1/1200.
+      CHECK(u(index.cell(i, 0, -1), 2) == Approx(2e-3 * (1 - x * x) / (2.0 / 3 + 1.0 / 1200)).epsilon(1e-12));
+      CHECK(u(index.cell(i, 5, -1), 2) == u(index.cell(i, 0, -1), 2));
+    }
+  }
+  SECTION("parabolic beside a side that lets fluid through is refused") {
+    all[4].profile = Profile::parabolic;
+    all[1].type = Type::outflow;
+    CHECK_THROWS_WITH(Filled(box({6, 6, 6}, {2, 4, 3}), all, open), Catch::Contains("boundary.4.profile") && Catch::Contains("uniform"));
+  }
+  SECTION("parabolic on a grid of another origin is a disc's within round walls, and refused elsewhere") {
+    all[4].profile = Profile::parabolic;
+    const auto made = [&](const GridSettings& shape) {
+      Grid grid(Comm(), make_node_source(shape), open);
+      GridSettings file;
+      file.generator = GridSettings::Generator::file;
+      BoundaryConditions(grid, all, &file);
+    };
+    CHECK_NOTHROW(made(tube(12, 6)));
+    CHECK_THROWS_WITH(made(box({6, 6, 6}, {4, 4, 9})), Catch::Contains("boundary.4.profile") && Catch::Contains("\"table\""));
+    all[0].type = Type::symmetry;
+    CHECK_THROWS_WITH(made(tube(12, 6)), Catch::Contains("boundary.4.profile"));
+  }
+  SECTION("a table that carries no flow is refused by its key") {
+    all[4].profile = Profile::table;
+    all[4].radial_table = {{0, -3}, {1, -1}};
+    CHECK_THROWS_WITH(Filled(tube(12, 6), all, open), Catch::Contains("boundary.4.radial_table"));
+  }
   SECTION("a table is linear between its entries") {
     all[4].profile = Profile::table;
     all[4].radial_table = {{0, 3}, {0.5, 2}, {1, 0}};
@@ -164,7 +202,8 @@ TEST_CASE("each kind of side fills the boundary as it should", "[fluid]") {
   const Triple corner = at(0, 2, 5);
   CHECK(is(index.cell(-1, 2, 6), {0, corner[1], corner[2]}));
   CHECK(is(index.cell(-1, 5, 2), {0, 0, at(0, 4, 2)[2]}));
-  for (int side = 0; side < 6; ++side) CHECK(scene.conditions.is_wall(side) == (side == 1 || side == 2));
+  const std::vector<std::string> bounded{"a symmetry side", "a wall", "a wall", "a symmetry side", "an inlet", ""};
+  for (int side = 0; side < 6; ++side) CHECK(scene.conditions.bounded_by(side) == bounded[side]);
 
   const Components<float> change("corpuscle::test::change", index.size(), 3);
   Kokkos::parallel_for(

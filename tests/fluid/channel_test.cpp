@@ -109,6 +109,26 @@ TEST_CASE("a pressure gradient along two directions drives the flow against it",
   CHECK(std::abs(mean[1]) < 1e-12);
 }
 
+TEST_CASE("a loose momentum tolerance does not add up over a slow start", "[fluid]") {
+  // The flow needs some 10 us x 10^2 / (pi^2 1.1) to start: many steps, each of which changes it by little.
+  const auto speed = [](double tolerance) {
+    FluidSettings settings;
+    settings.pressure_gradient_Pa_per_um = {-1, 0, 0};
+    settings.momentum_tolerance = tolerance;
+    const GridSettings shape = box({4, 16, 4}, {4, 10, 4});
+    Grid grid(Comm(), make_node_source(shape), {true, false, true});
+    FluidSolver solver(grid, settings, sides(periodic_between_walls), &shape);
+    run(solver, 1, 40);
+    return mean_velocity(solver)[0];
+  };
+  const double right = speed(1e-6);
+  // A hundredth of each step's change is left over at most.
+  for (double tolerance : {1e-4, 1e-3, 1e-2, 3e-2, 0.1}) {
+    INFO(tolerance);
+    CHECK(speed(tolerance) == Approx(right).epsilon(0.01));
+  }
+}
+
 TEST_CASE("the divergence vanishes after every step", "[fluid]") {
   using Map = GridSettings::CrossSection;
   const auto map = GENERATE(Map::conformal, Map::elliptical);

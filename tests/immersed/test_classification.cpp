@@ -322,7 +322,7 @@ TEST_CASE("vertices beyond a boundary and close to a wall are reported") {
   const GridViews grid = make_grid({{20, 20, 20}}, uniform({-2, -2, -2}, {0.2, 0.2, 0.2}));
   const SurfaceSet surface = make_surface_set({sphere(2, 0.5, {0, 0, 0}), sphere(2, 0.6, {1.1, 0.01, 0})});
   ImmersedOptions options;
-  options.wall = {false, true, true, true, false, false};
+  options.guarded = {false, true, true, true, false, false};
   ImmersedBoundary ib(grid, surface, options);
   ib.classify();
   CHECK(ib.counts().lost_vertex == -1);

@@ -7,6 +7,7 @@
 #include "core/error.hpp"
 #include "core/units.hpp"
 #include "input/case.hpp"
+#include "input/case_changes.hpp"
 
 using namespace corpuscle;
 namespace fs = std::filesystem;
@@ -26,6 +27,7 @@ void require_same(const Case& a, const Case& b) {
   REQUIRE(a.grid == b.grid);
   REQUIRE(a.fluid == b.fluid);
   REQUIRE(a.boundaries == b.boundaries);
+  REQUIRE(a.cell_types == b.cell_types);
   REQUIRE(a.cells == b.cells);
   REQUIRE(a.bodies == b.bodies);
   REQUIRE(a.coupling == b.coupling);
@@ -96,6 +98,106 @@ TEST_CASE("units of the case file become internal ones") {
 
   const auto wall = read("couette.toml").boundaries.at(1);
   REQUIRE(wall.velocity.value() == Triple{2e-3, 0, 0});
+}
+
+namespace {
+
+/// The straight tube with cells of two types and one with keys of its own.
+Case typed_case(const std::vector<std::string>& overrides = {}) {
+  const auto path = fs::temp_directory_path() / "corpuscle_test_types.toml";
+  std::ifstream in(cases / "straight_tube.toml");
+  std::ofstream(path) << in.rdbuf() << R"(
+[[cell_types]]
+name = "stiff"
+vertices = 300
+reference = "spheroid"
+shear_modulus_uN_per_m = 20
+[[cell_types]]
+name = "capsule"
+shape = "sphere"
+radius_um = 2
+law = "skalak"
+skalak_c = 10
+[[cells]]
+type = "capsule"
+center_um = [0, 0, 8]
+[[cells]]
+type = "stiff"
+center_um = [0, 0, 14]
+axis = [0, 1, 0]
+[[cells]]
+type = "stiff"
+center_um = [0, 0, -9]
+)";
+  auto scene = read_case(path.string(), overrides);
+  fs::remove(path);
+  return scene;
+}
+
+std::vector<std::string> changed_keys(const Case& before, const Case& now, bool geometry) {
+  std::vector<std::string> keys;
+  for (const auto& change : case_changes(before.resolved, now.resolved))
+    if (change.geometry == geometry) keys.push_back(change.key);
+  return keys;
+}
+
+}  // namespace
+
+TEST_CASE("cells have what their type says, and the echo keeps types") {
+  const auto scene = typed_case({"cell_types.0.vertices=400", "cell_types.0.bending_modulus_J=1.7e-19"});
+  REQUIRE(scene.cell_types.size() == 2);
+  REQUIRE(scene.cells.size() == 4);
+  REQUIRE(scene.cells[0].type == -1);
+  const auto &capsule = scene.cells[1], &stiff = scene.cells[2];
+  REQUIRE(capsule.type == 1);
+  REQUIRE(capsule.shape == CellSettings::Shape::sphere);
+  REQUIRE(capsule.law == CellSettings::Law::skalak);
+  REQUIRE(capsule.skalak_c == 10);
+  // A sheet has its own resistance to change of area, and no further one unless asked for.
+  REQUIRE(capsule.area_modulus_uN_per_m == 0);
+  REQUIRE(capsule.local_area_modulus_uN_per_m == 0);
+  REQUIRE(stiff.vertices == 400);
+  REQUIRE(stiff.shear_modulus_uN_per_m == 20);
+  REQUIRE(stiff.reference_reduced_volume == 0.95);
+  REQUIRE(stiff.area_modulus_uN_per_m == 236);
+  REQUIRE(stiff.axis == Triple{0, 1, 0});
+  REQUIRE(scene.cells[3].center_um == Triple{0, 0, -9});
+  REQUIRE(scene.cells[3].vertices == 400);
+  require_same(scene, read_echo(scene));
+}
+
+TEST_CASE("keys without effect on membranes that are forces are remarked upon") {
+  REQUIRE(read("straight_tube.toml").remarks.empty());
+  const auto scene = read("straight_tube.toml", {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"});
+  REQUIRE(scene.remarks.size() == 2);
+  REQUIRE(scene.remarks[0] == "cells.0.mass_pg = 100 has no effect with coupling.scheme = \"force\": membranes have no mass of their own");
+  REQUIRE(scene.remarks[1].rfind("cells.0.interior = \"empty\" has no effect", 0) == 0);
+  require_same(scene, read_echo(scene));
+  const auto typed = typed_case({"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cell_types.1.mass_pg=30"});
+  REQUIRE(typed.remarks.size() == 2);
+  REQUIRE(typed.remarks[0].rfind("cell_types.1.mass_pg = 30 (and 1 more) has no effect", 0) == 0);
+}
+
+TEST_CASE("a restart lists changed laws and constants of types, and refuses other shapes") {
+  const auto before = typed_case();
+  using Keys = std::vector<std::string>;
+  const auto now = typed_case({"cells.0.law=neo-hookean", "cell_types.1.skalak_c=5", "cell_types.0.reference_reduced_volume=0.97"});
+  REQUIRE(changed_keys(before, now, true).empty());
+  // A sheet has no terms of area by default.
+  REQUIRE(changed_keys(before, now, false) == Keys{"cell_types.0.reference_reduced_volume", "cell_types.1.skalak_c", "cells.0.law",
+                                                   "cells.0.area_modulus_uN_per_m", "cells.0.local_area_modulus_uN_per_m"});
+  const auto disc = read("straight_tube.toml");
+  REQUIRE(changed_keys(disc, read("straight_tube.toml", {"cells.0.diameter_um=6"}), true) == Keys{"cells.0.diameter_um"});
+  REQUIRE(changed_keys(before, typed_case({"cell_types.1.radius_um=3"}), true) == Keys{"cell_types.1.radius_um"});
+  REQUIRE(changed_keys(before, typed_case({"cell_types.0.diameter_um=6"}), true) == Keys{"cell_types.0.diameter_um"});
+  REQUIRE(changed_keys(before, typed_case({"cell_types.0.vertices=500"}), true) == Keys{"cell_types.0.vertices"});
+  REQUIRE(changed_keys(before, typed_case({"cells.3.type=capsule"}), true) == Keys{"cells.3.type"});
+  // Membranes as forces have fluid inside; the others differ in how they move only.
+  const auto sharp = typed_case({"cells.0.membrane_viscosity_N_s_per_m=0"});
+  const auto force = typed_case({"cells.0.membrane_viscosity_N_s_per_m=0", "coupling.scheme=force"});
+  REQUIRE(changed_keys(sharp, force, true) == Keys{"coupling.scheme"});
+  REQUIRE(changed_keys(force, sharp, true) == Keys{"coupling.scheme"});
+  REQUIRE(changed_keys(before, typed_case({"coupling.scheme=iterated"}), true).empty());
 }
 
 TEST_CASE("a flow with cells but no [coupling] is coupled by robin") {

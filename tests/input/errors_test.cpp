@@ -98,6 +98,7 @@ TEST_CASE("wrong values: file, line, key, value and what is allowed") {
       {"[fluid]",
        "[fluid]\npressure_gradient_Pa_per_um = [0, 0, 1]",
        {":10: fluid.pressure_gradient_Pa_per_um", "needs a pair of periodic sides"}},
+      {"[fluid]", "[fluid]\ndensity_pg_per_um3 = 1e300", {":10: fluid.density_pg_per_um3 = 1e+300", "at most"}},
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = true", {":13: boundary.0.velocity_mm_per_s = true", "mean speed"}},
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = [1, 2]", {":13: boundary.0.velocity_mm_per_s", "three numbers"}},
       {"\"velocity_inlet\"", "\"inlet\"", {":12: boundary.0.type", "one of \"velocity_inlet\", \"outflow\""}},
@@ -174,6 +175,20 @@ TEST_CASE("grid generators take their own keys only") {
   require_parts(grid("generator = \"file\"\nnodes = [5, 5, 5]"), {":6: grid.nodes", "the file decides"});
 }
 
+TEST_CASE("a pressure gradient along a direction that is not periodic is refused, one along a periodic one is not") {
+  auto slit = flow;
+  for (const char* side : {"i_min", "i_max"}) {
+    const std::string entry = "side = \"" + std::string(side) + "\"\ntype = ";
+    slit = replaced(slit, entry + "\"wall\"", entry + "\"periodic\"");
+  }
+  const auto with = [&](const std::string& value) {
+    return message(replaced(slit, "[fluid]\n", "[fluid]\npressure_gradient_Pa_per_um = " + value + "\n"));
+  };
+  CHECK(with("[-0.8, 0, 0]") == "accepted");
+  require_parts(with("[-0.8, 0, 1e-3]"), {":10: fluid.pressure_gradient_Pa_per_um", "z component drives nothing", "k_min and k_max"});
+  require_parts(with("[0, 0.5, 0]"), {":10: fluid.pressure_gradient_Pa_per_um", "y component drives nothing", "j_min and j_max"});
+}
+
 TEST_CASE("boundaries must make sense together") {
   const auto with = [](const std::string& from, const std::string& to) { return message(replaced(flow, from, to)); };
   require_parts(with("\"j_max\"", "\"j_min\""), {":27: boundary.5.side", "already has a [[boundary]] (boundary.4)"});
@@ -234,16 +249,25 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell(from_file + "recenter = 1"), {":13: cells.0.recenter = 1", "true or false"});
   require_parts(cell(from_file + "recentre = true"), {":13: cells.0.recentre", "did you mean 'recenter'?"});
   require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"iterated\", \"loose\""});
-  require_parts(cell("[coupling]\ntolerance = 1"), {":13: coupling.tolerance = 1", "from 1e-12 to 0.5"});
   const std::string force = "[coupling]\nscheme = \"force\"\n";
   REQUIRE(cell(force + "kernel = \"four-point\"\nslip = false") == "accepted");
   require_parts(cell(force + "kernel = \"two-point\""), {":14: coupling.kernel", "\"three-point\", \"four-point\""});
-  for (const char* key : {"tolerance = 0.001", "max_iterations = 10", "robin_coefficient_pg_per_um2_per_us = 1", "robin_in_iterated = true",
-                          "acceleration = \"aitken\""})
-    require_parts(cell(force + key), {":14: coupling." + std::string(key), "nothing is iterated"});
+  for (const char* key : {"tolerance = 0.001", "max_iterations = 10", "robin_in_iterated = true", "acceleration = \"aitken\""})
+    require_parts(cell(force + key), {":14: coupling." + std::string(key), "only scheme = \"iterated\""});
+  require_parts(cell(force + "robin_coefficient_pg_per_um2_per_us = 1"), {":14: coupling.robin_coefficient", "move with the fluid"});
   for (const char* key : {"kernel = \"three-point\"", "slip = true"})
     require_parts(cell("[coupling]\n" + std::string(key)), {":13: coupling." + std::string(key), "only scheme = \"force\""});
   require_parts(cell("membrane_viscosity_N_s_per_m = 1e-7\n" + force), {":12: cells.0.membrane_viscosity_N_s_per_m", "must be 0"});
+  require_parts(cell("[coupling]\nscheme = \"iterated\"\ntolerance = 1"), {":14: coupling.tolerance = 1", "from 1e-12 to 0.5"});
+  for (const char* key : {"tolerance = 1e-4", "max_iterations = 5", "acceleration = \"aitken\"", "robin_in_iterated = false"})
+    require_parts(cell("[coupling]\n" + std::string(key)),
+                  {":13: coupling." + std::string(key).substr(0, std::string(key).find(' ')), "only scheme = \"iterated\""});
+  for (const char* key : {"shear_modulus_uN_per_m = 1e300", "volume_modulus_Pa = 1e300", "axis = [1e200, 0, 1e200]", "mass_pg = 1e300"}) {
+    const std::string name(key, std::string(key).find(' '));
+    require_parts(cell(key), {":12: cells.0." + name, "must be", "a number"});
+  }
+  require_parts(message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [1e300, 0, 0]\n")),
+                {":11: cells.0.center_um = [1e+300, 0, 0]", "each a number from -1"});
   require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
 
   const auto body = [](const std::string& text) {
@@ -269,6 +293,69 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(body("shape = \"sphere\"\nradius_um = 1\n[coupling]"), {":14: coupling: there are no [[cells]]"});
   require_parts(body("shape = \"sphere\"\nradius_um = 1\n[[cells]]\ncenter_um = [2, 2, 2]\n[coupling]\nscheme = \"force\""),
                 {"bodies: there are no rigid bodies beside membranes"});
+}
+
+TEST_CASE("shapes, laws and resting states of cells take their own keys only") {
+  const auto cell = [](const std::string& text) {
+    return message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [2, 2, 2]\n" + text + "\n"));
+  };
+  const std::string sphere = "shape = \"sphere\"\nradius_um = 3\n", skalak = "law = \"skalak\"\n";
+  REQUIRE(cell(sphere + skalak + "skalak_c = 10\nvertices = 42\nbending_modulus_J = 0\ninflation = 0.05") == "accepted");
+  REQUIRE(cell("diameter_um = 6\nreference = \"spheroid\"\nreference_reduced_volume = 0.93") == "accepted");
+  REQUIRE(cell("shape = \"ellipsoid\"\nsemi_axes_um = [3, 2, 1]\nlaw = \"neo-hookean\"") == "accepted");
+  require_parts(cell("shape = \"disc\""), {":12: cells.0.shape = \"disc\"", "one of \"biconcave\", \"sphere\", \"ellipsoid\""});
+  require_parts(cell("shape = \"sphere\""), {":10: cells.0.radius_um: required key is missing", "from 0.5 to 50"});
+  require_parts(cell("radius_um = 3"), {":12: cells.0.radius_um = 3", "only shape = \"sphere\""});
+  require_parts(cell(sphere + "diameter_um = 6"), {":14: cells.0.diameter_um = 6", "only shape = \"biconcave\""});
+  require_parts(cell("diameter_um = 0.5"), {":12: cells.0.diameter_um = 0.5", "from 1 to 100"});
+  require_parts(cell("shape = \"ellipsoid\"\nsemi_axes_um = [0.1, 0.1, 0.2]"), {":13: cells.0.semi_axes_um", "are these um?"});
+  require_parts(cell("shape = \"ellipsoid\"\nsemi_axes_um = [11, 1, 1]"), {":13: cells.0.semi_axes_um", "ten times", "mesh file"});
+  require_parts(cell(sphere + "vertices = 41"), {":14: cells.0.vertices = 41", "from 42 to 30000"});
+  require_parts(cell("law = \"skalack\""), {":12: cells.0.law", "\"wlc-pow\", \"neo-hookean\", \"skalak\"", "did you mean \"skalak\"?"});
+  require_parts(cell("skalak_c = 10"), {":12: cells.0.skalak_c = 10", "only law = \"skalak\""});
+  require_parts(cell(skalak + "skalak_c = -1"), {":13: cells.0.skalak_c = -1", "from 0 to"});
+  REQUIRE(cell(skalak + "local_area_modulus_uN_per_m = 0") == "accepted");
+  require_parts(cell("reference_reduced_volume = 0.95"), {":12: cells.0.reference_reduced_volume", "only reference = \"spheroid\""});
+  require_parts(cell("reference = \"spheroid\"\nreference_reduced_volume = 0.6"), {":13: cells.0.reference_reduced_volume = 0.6", "0.65 to 1"});
+  require_parts(cell(sphere + "reference = \"spheroid\""), {":14: cells.0.reference", "only the built-in biconcave shape", "leave out"});
+  require_parts(cell("inflation = 0.1"), {":12: cells.0.inflation = 0.1", "only shape = \"sphere\""});
+  require_parts(cell(sphere + "inflation = -0.1"), {":14: cells.0.inflation = -0.1", "from 0 to 1"});
+
+  const auto surface = (fs::temp_directory_path() / "corpuscle_shape.off").string();
+  std::ofstream(surface) << "read later\n";
+  const std::string mesh = "mesh = \"" + surface + "\"\n";
+  REQUIRE(cell(mesh + "law = \"neo-hookean\"") == "accepted");
+  for (const char* key : {"shape = \"sphere\"", "radius_um = 3", "diameter_um = 6"})
+    require_parts(cell(mesh + key), {":13: cells.0.", "the mesh file decides the shape", "leave out this key or mesh"});
+  require_parts(cell(mesh + "reference = \"spheroid\""), {":13: cells.0.reference", "only the built-in biconcave shape"});
+  fs::remove(surface);
+}
+
+TEST_CASE("cell types are checked") {
+  const std::string rbc = "[[cell_types]]\nname = \"rbc\"\n";
+  const auto types = [](const std::string& text, const std::vector<std::string>& overrides = {}) {
+    return message(replaced(flow, "[fluid]\n", text + "[fluid]\n"), overrides);
+  };
+  const std::string cell = "[[cells]]\ntype = \"rbc\"\ncenter_um = [2, 2, 2]\n";
+  REQUIRE(types(rbc + cell) == "accepted");
+  REQUIRE(types(rbc + cell + "axis = [1, 0, 0]\nspin_deg = 20\n") == "accepted");
+  REQUIRE(types(cell + rbc) == "accepted");  // in any order
+  require_parts(types("[[cell_types]]\nvertices = 300\n"), {":9: cell_types.0.name: required key is missing"});
+  require_parts(types("[[cell_types]]\nname = \"\"\n"), {":10: cell_types.0.name", "must not be empty"});
+  require_parts(types(rbc + rbc), {":12: cell_types.1.name = \"rbc\"", "cell_types.0 has this name already"});
+  require_parts(types(rbc + "vertices = 100\n"), {":11: cell_types.0.vertices = 100", "from 200 to 30000"});
+  require_parts(types(rbc + "center_um = [0, 0, 0]\n"), {":11: cell_types.0.center_um", "in the [[cells]] entry"});
+  require_parts(types(rbc + "vertexes = 300\n"), {":11: cell_types.0.vertexes", "did you mean 'vertices'?"});
+  require_parts(types(rbc + cell, {"cells.0.type=rcb"}), {"--set cells.0.type=rcb", "unknown cell type; known: \"rbc\"", "did you mean \"rbc\"?"});
+  require_parts(types(cell), {":10: cells.0.type = \"rbc\"", "no [[cell_types]]", "leave out type"});
+  require_parts(types(rbc + cell + "vertices = 300\n"), {":14: cells.0.vertices = 300", "cell's type, \"rbc\"", "set cell_types.0.vertices"});
+  require_parts(types(rbc + cell + "mass_pg = 100\n"), {"cells.0.mass_pg", "set cell_types.0.mass_pg"});
+  require_parts(types(rbc + cell + "spin = 300\n"), {"cells.0.spin", "unknown key; did you mean 'spin_deg'?"});
+  require_parts(types(rbc + cell + "zzzz = 1\n"), {"cells.0.zzzz", "unknown key; known here: type, center_um, axis, spin_deg"});
+  require_parts(types(rbc + "[[cells]]\ntype = \"rbc\"\n"), {":11: cells.0.center_um: required key is missing"});
+  require_parts(types(rbc + cell, {"cell_types.0.vertices=50"}), {"--set cell_types.0.vertices=50", "from 200 to 30000"});
+  require_parts(types(rbc + cell, {"cell_types.1.vertices=500"}), {"the case has 1 [[cell_types]]"});
+  require_parts(types(rbc + cell, {"cell_types.vertices=500"}), {"cell_types.0.key=value"});
 }
 
 TEST_CASE("a long value is shortened in a message") {

@@ -6,7 +6,6 @@
 #include "core/units.hpp"
 #include "membrane/diagnostics.hpp"
 #include "membrane/membrane_setup.hpp"
-#include "membrane/neo_hookean.hpp"
 #include "membrane_fixture.hpp"
 
 using namespace corpuscle;
@@ -33,7 +32,7 @@ struct OneCell {
     reference.law = only(term, reference.law);
     if (term != Term::springs && term != Term::all) reference.in_plane = WlcPow{};
     views = make_membrane_views(make_surface_set({reference.mesh}), {reference}, {0});
-    elasticity = make_elasticity({reference});
+    elasticity = make_elasticity({reference}, {0});
     table = Table<double>("corpuscle::test::table", 1, CellColumn::count);
     rest = to_host(views.surface.x, views.vertices);
     x = deformed(rest, 0.03);
@@ -117,7 +116,7 @@ std::array<double, 2> imbalance(const std::vector<Vec3>& x, const std::vector<Ve
 template <class Law>
 void check_law(const Law& law) {
   OneCell cell(cell_settings(300), Term::springs);
-  cell.elasticity = std::make_unique<ElasticityOf<Law>>(one_type(law));
+  cell.elasticity = std::make_unique<ElasticityOf<Law, AllCells>>(one_type(law), AllCells{1});
   CHECK(force_error(cell) < 1e-6);
   const auto force = to_host(cell.views.force, cell.views.vertices);
   const auto [net, torque] = imbalance(cell.x, force);
@@ -166,6 +165,19 @@ TEST_CASE("internal forces of a deformed cell exert no net force or torque") {
 TEST_CASE("laws of springs and of triangles plug in alike") {
   check_law(SpringNetwork<HookeanSpring>{{5e-3}});
   check_law(NeoHookean{{5e-3}});
+  check_law(Skalak{{5e-3, 0}});
+  check_law(Skalak{{5e-3, 20}});
+}
+
+TEST_CASE("with every law that a scene can choose, all terms together are minus the gradient of the energy") {
+  CellSettings settings = cell_settings(300);
+  settings.law = GENERATE(CellSettings::Law::wlc_pow, CellSettings::Law::neo_hookean, CellSettings::Law::skalak);
+  OneCell cell(settings, Term::all);
+  INFO("law " << int(settings.law));
+  CHECK(force_error(cell) < 1e-6);
+  const auto [net, torque] = imbalance(cell.x, to_host(cell.views.force, cell.views.vertices));
+  CHECK(net < 1e-12);
+  CHECK(torque < 1e-12);
 }
 
 TEST_CASE("a neo-Hookean triangle has the energy of its principal stretches, whatever its shape") {
@@ -286,6 +298,11 @@ TEST_CASE("constants out of range are refused") {
     s = cell_settings(200);
   };
   s.local_area_modulus_uN_per_m = 0, refused("local_area_modulus_uN_per_m");
+  s.law = CellSettings::Law::neo_hookean, s.local_area_modulus_uN_per_m = -1, refused("local_area_modulus_uN_per_m");
+  s.law = CellSettings::Law::skalak, s.skalak_c = -1, refused("skalak_c");
+  s.type = 3, s.shear_modulus_uN_per_m = -1;
+  CHECK_THROWS_WITH(make_reference(s), Catch::Matchers::Contains("cell_types.3.shear_modulus_uN_per_m"));
+  s = cell_settings(200);
   s.mass_pg = 0, refused("mass_pg");
   s.shear_modulus_uN_per_m = -1, refused("shear_modulus_uN_per_m");
   s.membrane_viscosity_N_s_per_m = NAN, refused("membrane_viscosity_N_s_per_m");

@@ -144,6 +144,33 @@ TEST_CASE("a pull beyond what links can bear is a computation error") {
   CHECK_THROWS_WITH(stretch_cell(m, settings), Contains("not at rest") && Contains("stretching.force_pN"));
 }
 
+TEST_CASE("a membrane too soft for the force is called that, though it rests") {
+  StretchingSettings settings;
+  settings.steps = 16;
+  auto soft = cell_settings(200);
+  soft.shear_modulus_uN_per_m = 1e-3;
+  Membranes m({soft});
+  CHECK_THROWS_WITH(stretch_cell(m, settings), Contains("of its contour length") && Contains("cells.0.shear_modulus_uN_per_m") &&
+                                                   !Contains("not at rest"));
+}
+
+TEST_CASE("how far the curve may lie from the lines between computed forces") {
+  StretchingResult r;
+  for (double force : {0.0, 50.0, 100.0}) {
+    StretchingStep step;
+    step.force_pN = force;
+    step.axial_um = 8 + 4e-4 * force * force;  // a parabola: 50^2 x 4e-4 / 4 from its chords
+    step.transverse_um = 8 - 0.01 * force;
+    r.steps.push_back(step);
+  }
+  ExperimentPoint point{25, 7.75, 8.25, 0, 10, 0, 10};
+  CHECK(compare(r, {point}).interpolation_um == Approx(0.25));
+  r.steps.pop_back();
+  CHECK(compare(r, {point}).interpolation_um == Approx(0.5));
+  point.force_pN = 60;
+  CHECK(compare(r, {point}).points == 0);
+}
+
 TEST_CASE("experiment files") {
   const auto points = read_experiment(mills);
   REQUIRE(points.size() == 13);

@@ -187,6 +187,24 @@ TEST_CASE("sizes that are not a cell's are refused with the scale that makes the
   CHECK(right.area_um2 == Approx(area(cell)).epsilon(1e-12));
 }
 
+TEST_CASE("a ring is no cell, and a shape of few vertices hardly one") {
+  TriangleMesh ring;
+  constexpr int around = 24, across = 12;
+  for (int i = 0; i < around; ++i)
+    for (int j = 0; j < across; ++j) {
+      const double a = 2 * M_PI * i / around, b = 2 * M_PI * j / across, r = 3 + std::cos(b);
+      ring.vertices.push_back({r * std::cos(a), r * std::sin(a), std::sin(b)});
+      const int next = (i + 1) % around, up = (j + 1) % across;
+      ring.triangles.push_back({i * across + j, next * across + j, next * across + up});
+      ring.triangles.push_back({i * across + j, next * across + up, i * across + up});
+    }
+  CHECK_THAT(CellFile(ring).refusal(), Contains("1 handle, like a ring"));
+  const auto warnings = [](int levels) { return CellFile(moved(octasphere(levels), {}, 4)).read().warnings; };
+  REQUIRE(warnings(1).size() == 1);
+  CHECK_THAT(warnings(1)[0], Contains("18 vertices are too few"));
+  CHECK(warnings(3).empty());
+}
+
 TEST_CASE("surfaces that face inward, in whole or in part, are turned with a word") {
   TriangleMesh inward = disc;
   for (auto& t : inward.triangles) std::swap(t[1], t[2]);

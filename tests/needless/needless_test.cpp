@@ -97,7 +97,7 @@ void check_flow(const std::string& name, std::vector<std::string> overrides, dou
   recorder.start();
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
-  FlowOutput output(folder.string(), scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
+  FlowOutput output({folder.string(), [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
   output.after_step(true);
   for (int n = 0; n < 4; ++n) {
     simulation.step();
@@ -208,6 +208,40 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
     check_flow("straight_tube", {tube, "coupling.scheme=iterated", "coupling.tolerance=0.01"});
   }
   SECTION("curved tube") { check_flow("curved_tube", {"grid.nodes=[17,17,31]"}); }
+}
+
+TEST_CASE("the laws of a scene's cells cost one launch each, and nothing where there is one", "[needless]") {
+  using Law = CellSettings::Law;
+  struct Launches {
+    int forces, measures, cell_lists;
+  };
+  const auto launches = [](const std::vector<Law>& laws) {
+    std::vector<CellSettings> cells(laws.size());
+    for (std::size_t c = 0; c < laws.size(); ++c) {
+      cells[c].vertices = 200;
+      cells[c].law = laws[c];
+      cells[c].center_um = {9.0 * static_cast<double>(c), 0, 0};
+      cells[c].shear_modulus_uN_per_m = 5 + static_cast<double>(c);  // a type each
+    }
+    Recorder recorder;
+    recorder.start();
+    Membranes membranes(cells);
+    membranes.compute_forces();
+    recorder.stop();
+    return Launches{Recorder::matching(Recorder::kernels(), "corpuscle::membrane::triangle_forces"),
+                    Recorder::matching(Recorder::kernels(), "corpuscle::membrane::measure"),
+                    Recorder::matching(Recorder::allocations(), "corpuscle::membrane::cells_law")};
+  };
+  for (Law law : {Law::wlc_pow, Law::neo_hookean, Law::skalak}) {
+    const auto one = launches({law, law});
+    CHECK(one.forces == 1);
+    CHECK(one.measures == 1);
+    CHECK(one.cell_lists == 0);
+  }
+  const auto two = launches({Law::wlc_pow, Law::skalak, Law::wlc_pow});
+  CHECK(two.forces == 2);
+  CHECK(two.measures == 1);
+  CHECK(two.cell_lists == 2);
 }
 
 TEST_CASE("stretching has no grid, no search and no coupling", "[needless]") {

@@ -280,7 +280,7 @@ TEST_CASE("broken and foreign checkpoints are refused by name and fault") {
     file.attribute("/", "format", "Corpuscle checkpoint");
     file.attribute("/", "version", std::int64_t{1});
   }
-  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 3") && Contains("another version of the program"));
+  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 4") && Contains("another version of the program"));
   {
     auto file = Hdf5File::create(bad.string());
     file.attribute("/", "format", "Corpuscle checkpoint");
@@ -317,6 +317,89 @@ TEST_CASE("a checkpoint with one wrong bit in any array is refused, and the arra
   std::swap_ranges(swapped.begin() + first, swapped.begin() + first + 8, swapped.begin() + first + 8);
   std::ofstream(bad, std::ios::binary) << swapped;
   REQUIRE_THAT(read_error(bad), Contains("'membrane/x' is damaged"));
+}
+
+TEST_CASE("a checkpoint with any other number or text of its header, or any other checksum, is refused") {
+  const auto folder = test::fresh_folder("checkpoint_header");
+  const auto good = folder / "checkpoint.h5", bad = folder / "bad.h5";
+  write_checkpoint(good.string(), Comm());
+  REQUIRE(read_error(good).empty());
+  CHECK(read_checkpoint_header(good.string()).time_us == header().time_us);
+  const auto change = [&](const char* object, const char* name, hid_t type, const void* value) {
+    fs::copy_file(good, bad, fs::copy_options::overwrite_existing);
+    const hid_t file = H5Fopen(bad.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t owner = H5Oopen(file, object, H5P_DEFAULT), at = H5Aopen(owner, name, H5P_DEFAULT);
+    INFO(object << " " << name);
+    REQUIRE(at >= 0);
+    REQUIRE(H5Awrite(at, type, value) >= 0);
+    H5Aclose(at);
+    H5Oclose(owner);
+    H5Fclose(file);
+    CHECK_THAT(read_error(bad), Contains("bad.h5") && (Contains("is damaged") || Contains("format version")));
+    CHECK_FALSE(test::message_of<InputError>([&] { read_checkpoint_header(bad.string()); }).empty());
+  };
+  const std::int64_t number = 77;
+  double time = header().time_us;
+  reinterpret_cast<unsigned char*>(&time)[7] ^= 0x40;
+  change("/", "time_us", H5T_NATIVE_DOUBLE, &time);
+  for (const char* name : {"step", "cells_i", "cells_j", "cells_k", "version"}) change("/", name, H5T_NATIVE_INT64, &number);
+  for (const char* array : {"membrane/x", "search/number", "fluid/p"}) change(array, "checksum", H5T_NATIVE_INT64, &number);
+  // Any bit of what the file holds in full: of the case, the lists of names and the time's own bytes.
+  const auto bytes = test::contents(good);
+  const double stored = header().time_us;
+  for (const auto& what : {std::string("########"), std::string("membrane/x\nsearch"), std::string(reinterpret_cast<const char*>(&stored), 8)}) {
+    const auto at = bytes.find(what);
+    REQUIRE(at != std::string::npos);
+    for (std::size_t bit = 0; bit < 8 * what.size(); bit += 5) {
+      auto damaged = bytes;
+      damaged[at + bit / 8] = static_cast<char>(damaged[at + bit / 8] ^ (1 << bit % 8));
+      std::ofstream(bad, std::ios::binary) << damaged;
+      INFO("bit " << bit << " of " << what);
+      CHECK_FALSE(read_error(bad).empty());
+    }
+  }
+}
+
+TEST_CASE("a stored time costs the same however many there are, and each is listed at once") {
+  const auto folder = test::fresh_folder("many_times");
+  const std::vector<double> x(9, 1.5);
+  const auto read_and_written = [] {
+    std::ifstream counts("/proc/self/io");
+    std::string name;
+    long value = 0, sum = 0;
+    while (counts >> name >> value)
+      if (name == "rchar:" || name == "wchar:") sum += value;
+    return sum;
+  };
+  if (read_and_written() == 0) return;  // not Linux
+  const auto path = (folder / "cells.h5").string();
+  {
+    CellWriter cells(folder.string(), Comm(), {0, 1, 2}, {0}, 3);
+    const auto store = [&](int from, int to) {
+      const long before = read_and_written();
+      for (int step = from; step < to; ++step) cells.write(step, step, x.data(), {});
+      return read_and_written() - before;
+    };
+    store(0, 100);
+    const long early = store(100, 200);
+    CHECK(stored_times(path, "a series of surfaces of Corpuscle").size() == 200);
+    store(200, 1500);
+    const long late = store(1500, 1600);
+    INFO(early << " bytes for a hundred times, then " << late);
+    // HDF5 keeps links in blocks, read and written whole, that double up to 64 kB: 3.0 times as much. All links anew: see above.
+    CHECK(static_cast<double>(late) < 4 * static_cast<double>(early));
+    // Somebody reads the file: it stays what it is for them, and the run goes on.
+    const auto reader = Hdf5File::read(path);
+    for (int step = 1600; step < 1604; ++step) cells.write(step, step, x.data(), {});
+    CHECK(reader.entries("/").size() == 1602);
+  }
+  CHECK(stored_times(path, "a series of surfaces of Corpuscle").size() == 1604);
+  const auto xdmf = test::contents(folder / "cells.xdmf");
+  std::size_t times = 0;
+  for (auto at = xdmf.find("<Time"); at != std::string::npos; at = xdmf.find("<Time", at + 1)) ++times;
+  CHECK(times == 1604);
+  CHECK_THAT(xdmf, Catch::EndsWith("</Xdmf>\n"));
+  for (const auto& entry : fs::directory_iterator(folder)) CHECK((entry.path().extension() == ".h5" || entry.path().extension() == ".xdmf" || entry.is_directory()));
 }
 
 TEST_CASE("a checkpoint that was not finished leaves the last good one", "[ranks]") {

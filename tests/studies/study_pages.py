@@ -72,5 +72,37 @@ def check_python():
               and f"{bare} -m pip install no_such_module" in result.stderr, f"no advice: {result.stderr}")
 
 
+def check_plot():
+    """Results that cannot be drawn: one line that says why, and exit code 2."""
+    plot = [sys.executable, str(ROOT / "cases/plot.py")]
+    if "no Python found here" in start([*plot, "--help"]).stderr:
+        sys.exit(77)
+    with tempfile.TemporaryDirectory() as folder:
+        run = pathlib.Path(folder) / "run"
+        words = ["run", str(ROOT / "cases/couette.toml"), "--out", str(run)]
+        for setting in ("grid.nodes=[5,5,5]", "time.end_us=2", "output.every_us=1"):
+            words += ["--set", setting]
+        check(start([os.environ["CORPUSCLE"], *words]).returncode == 0, "the run failed")
+        check(start([*plot, str(run)]).returncode == 0 and (run / "velocity.png").exists(), "a whole run cannot be drawn")
+
+        def refuse(parts, *options):
+            result = start([*plot, str(run), *options])
+            lines = result.stderr.strip().splitlines()
+            check(result.returncode == 2 and len(lines) == 1 and all(part in lines[0] for part in parts),
+                  f"exit code {result.returncode}, not one line with {parts}:\n{result.stdout}{result.stderr}")
+
+        refuse(["cannot be made a folder"], "--out", str(run / "report.json" / "below"))
+        refuse(["/proc/velocity.png", "cannot be written"], "--out", "/proc")
+        history = run / "history.csv"
+        for content, parts in ((b"time_us,cell,x\n0,0,1\n1,0,much\n", ["history.csv, line 3", "much"]),
+                               (bytes(range(256)), ["history.csv", "cannot be read as text"]),
+                               (b"a,b\n1,2\n", ["history.csv", "names no time_us"])):
+            history.write_bytes(content)
+            refuse(parts)
+        history.unlink()
+        (run / "fields/step_000000001.h5").unlink()
+        refuse(["fields.h5", "fields/step_000000001.h5", "missing"])
+
+
 if __name__ == "__main__":
-    check_python() if sys.argv[1] == "python" else check_study(sys.argv[1])
+    {"python": check_python, "plot": check_plot}.get(sys.argv[1], lambda: check_study(sys.argv[1]))()

@@ -1,0 +1,116 @@
+#include "input/key_list.hpp"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <set>
+
+#include "core/error.hpp"
+#include "core/nearest.hpp"
+#include "input/overrides.hpp"
+#include "input/sections.hpp"
+
+namespace corpuscle {
+namespace {
+
+using Read = std::function<void(Section&)>;
+using Reasons = std::map<std::string, std::set<std::string>>;  // key to why it has no meaning somewhere
+
+KeyRecorder recorded(const std::string& name, const Read& read, const std::map<std::string, std::size_t>& chosen) {
+  const CaseSource nowhere;
+  Section section(nowhere, name, nullptr);
+  KeyRecorder recorder;
+  recorder.chosen = chosen;
+  section.record_into(recorder);
+  try {
+    read(section);
+  } catch (const RecordingEnds&) {  // a combination that is refused: what was read until then counts
+  }
+  return recorder;
+}
+
+/// Adds the keys of one run, each after the one before it, and the reasons why others have no meaning.
+void merge(const KeyRecorder& run, std::vector<KeyRecord>& keys, Reasons& why) {
+  std::size_t place = 0;
+  for (const auto& key : run.keys) {
+    const auto known = std::find_if(keys.begin(), keys.end(), [&](const auto& k) { return k.key == key.key; });
+    if (known == keys.end()) {
+      keys.insert(keys.begin() + static_cast<long>(place), key);
+      ++place;
+    } else {
+      place = static_cast<std::size_t>(known - keys.begin()) + 1;
+    }
+  }
+  for (const auto& [key, reason] : run.unused) why[key].insert(reason);
+}
+
+std::vector<KeyRecord> keys_of(const std::string& name, const Read& read) {
+  std::vector<KeyRecord> keys;
+  Reasons why;
+  std::vector<std::map<std::string, std::size_t>> waiting{{}};
+  while (!waiting.empty()) {
+    const auto chosen = waiting.back();
+    waiting.pop_back();
+    const KeyRecorder run = recorded(name, read, chosen);
+    merge(run, keys, why);
+    for (const auto& [key, words] : run.choices) {
+      if (chosen.count(key)) continue;
+      for (std::size_t word = words.size(); word-- > 0;) {
+        auto next = chosen;
+        next[key] = word;
+        waiting.push_back(next);
+      }
+      break;  // the others are asked for again then
+    }
+  }
+  for (auto& key : keys)
+    if (const auto found = why.find(key.key); found != why.end()) key.only = fmt::format("{}", fmt::join(found->second, "; "));
+  return keys;
+}
+
+Read reader_of(const std::string& name) {
+  if (name == "time") return read_time;
+  if (name == "grid") return read_grid;
+  if (name == "fluid") return read_fluid;
+  if (name == "boundary") return read_boundary;
+  if (name == "cell_types") return [](Section& s) { read_cell_type(s, {}); };
+  if (name == "cells") return [](Section& s) { read_cell(s, {}, true); };
+  if (name == "bodies") return read_body;
+  if (name == "coupling") return read_coupling;
+  if (name == "stretching") return read_stretching;
+  if (name == "output") return [](Section& s) { read_output(s, true, true); };
+  return {};
+}
+
+}  // namespace
+
+std::vector<SectionRecord> list_keys() {
+  std::vector<SectionRecord> sections;
+  for (const auto& [name, listed] : section_names)
+    if (const Read read = reader_of(name)) sections.push_back({name, listed, keys_of(name, read)});
+  return sections;
+}
+
+std::string keys_text(const std::string& section) {
+  std::string text;
+  std::vector<std::string> names;
+  if (section.empty()) text = "title = a text in quotes (left out: none)\n";
+  for (const auto& s : list_keys()) {
+    names.push_back(s.name);
+    if (!section.empty() && section != s.name) continue;
+    text += fmt::format("\n{0}{1}{2}{3}\n", s.listed ? "[[" : "[", s.name, s.listed ? "]]" : "]", s.listed ? "   as often as needed" : "");
+    for (const auto& key : s.keys) {
+      const std::string otherwise = !key.value.empty() ? "default " + key.value : key.optional ? "may be left out" : "required";
+      text += fmt::format("  {}: {}; {}{}\n", key.key, key.allowed, otherwise, key.only.empty() ? "" : "; " + key.only);
+    }
+  }
+  if (!section.empty() && std::find(names.begin(), names.end(), section) == names.end()) {
+    const auto like = nearest(section, names);
+    throw InputError(fmt::format("keys {}: no such section; {}", section,
+                                 like.empty() ? fmt::format("there are {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
+  }
+  return text;
+}
+
+}  // namespace corpuscle
