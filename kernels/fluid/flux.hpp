@@ -16,25 +16,28 @@ inline CellBox face_box(const IndexSpace& index, int d) {
   return box;
 }
 
-/// grad [cell, 3] = masked gradient of p at fluid nodes of owned cells and one halo layer; zero elsewhere.
-inline void pressure_gradient(const GridViews& grid, const Array<NodeKind>& kind, const PressureMask& mask,
-                              const Array<double>& p, const Components<double>& grad) {
+/// grad [cell, 3] = masked gradient of p, less the force, at fluid nodes of owned cells and one halo layer; zero elsewhere.
+template <class Force = NoFaceForce>
+void pressure_gradient(const GridViews& grid, const Array<NodeKind>& kind, const PressureMask& mask, const Array<double>& p,
+                       const Components<double>& grad, const Force& force = {}) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   for_box("corpuscle::fluid::pressure_gradient", {-1, -1, -1}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
           KOKKOS_LAMBDA(int i, int j, int k) {
             const int c = index.cell(i, j, k);
-            store(grad, c, kind(c) == NodeKind::fluid ? cell_gradient(p, mask, x, index, c) : Vec3{});
+            store(grad, c, kind(c) == NodeKind::fluid ? cell_gradient(p, mask, x, index, c, force) : Vec3{});
           });
 }
 
 /// Face fluxes of the provisional velocity. Between fluid nodes the mean velocity is supplemented by the difference of
 /// the wide and the compact pressure gradient times V / diagonal, which couples odd and even nodes (Rhie and Chow,
-/// AIAA J. 21, 1983); on the boundary and next to bodies the known velocities are used as they are.
-template <bool skewed>
+/// AIAA J. 21, 1983); on the boundary and next to bodies the known velocities are used as they are. A force on faces is part
+/// of both gradients.
+template <bool skewed, class Force = NoFaceForce>
 void interpolate_flux(const GridViews& grid, const Array<double> (&coefficient)[3], const Array<NodeKind>& kind,
                       const PressureMask& mask, const Array<double>& diagonal, const Components<double>& u,
-                      const Array<double>& p, const Components<double>& grad_p, const Array<double> (&flux)[3]) {
+                      const Array<double>& p, const Components<double>& grad_p, const Array<double> (&flux)[3],
+                      const Force& force = {}) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   const auto volume = grid.volume;
@@ -55,7 +58,7 @@ void interpolate_flux(const GridViews& grid, const Array<double> (&coefficient)[
         if (kind(c) == NodeKind::fluid && kind(low) == NodeKind::fluid) {
           const double reach = 0.5 * (volume(c) / diagonal(c) + volume(low) / diagonal(low));
           const double wide = 0.5 * dot(s, load(grad_p, c) + load(grad_p, low));
-          value += reach * (wide - face_gradient<skewed>(p, mask, x, s, g(c), index, d, c));
+          value += reach * (wide - face_gradient<skewed>(p, mask, x, s, g(c), index, d, c, force));
         }
         f(c) = value;
       }

@@ -24,7 +24,7 @@ inline void wrap_bodies(const SurfaceSet& set, int first, int last, const Period
   const auto first_vertex = set.first_vertex;
   const int vertices = set.vertices;
   Kokkos::parallel_for(
-      "corpuscle::immersed::wrap_bodies", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO),
+      "corpuscle::surface::wrap_bodies", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO),
       KOKKOS_LAMBDA(const Team& team) {
         const int body = first + team.league_rank(), begin = first_vertex(body), end = first_vertex(body + 1);
         Sums<3> sum;

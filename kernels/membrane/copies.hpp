@@ -17,4 +17,13 @@ inline void copy_motion(int vertices, const Components<double>& x, const Compone
       });
 }
 
+/// to = x + dt v, over the first `vertices` rows, all [vertex, 3].
+inline void move_along(int vertices, const Components<double>& x, const Components<double>& v, double dt,
+                       const Components<double>& to) {
+  Kokkos::parallel_for(
+      "corpuscle::membrane::move_along", Policy(0, vertices), KOKKOS_LAMBDA(int i) {
+        for (int d = 0; d < 3; ++d) to(i, d) = x(i, d) + dt * v(i, d);
+      });
+}
+
 }  // namespace corpuscle

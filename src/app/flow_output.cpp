@@ -52,7 +52,7 @@ FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& si
   columns.bodies = simulation.rigid_bodies() != nullptr;
   if (columns.cells) columns.more = shape_columns;
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
-  if (simulation.immersed()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
+  if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
 #ifdef CORPUSCLE_HDF5
   if (scene.output.fields)
     fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
@@ -88,7 +88,7 @@ void FlowOutput::sample_flow() {
   const bool regular = step <= first || step % every == 0;
   if (!regular && !simulation_.done() && !simulation_.at_outflow()) return;
   const FlowSample sample{simulation_.time(), simulation_.fluid().splitting(),
-                          simulation_.surfaces() ? simulation_.immersed()->slip()[1] : 0.0};
+                          simulation_.immersed() ? simulation_.immersed()->slip()[1] : 0.0};
   if (regular)
     totals_.add(sample);
   else
@@ -179,7 +179,7 @@ void FlowOutput::measure() {
     watch_cells(cells);
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
-    const auto travelled = simulation_.immersed()->wrapped_by();
+    const auto travelled = simulation_.coupling()->wrapped_by();
     for (int c = 0; c < simulation_.cells(); ++c) {
       auto sample = cell_sample(c, cells[c], travelled[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape_columns.size() + balance_columns.size(), std::nan(""));
@@ -333,7 +333,7 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   errors["flux_correction"] = now.flux_correction;
   errors["splitting"] = now.splitting_until_us > 0 ? now.splitting_us / now.splitting_until_us : 0.0;
   errors["splitting_max"] = now.splitting_max;
-  if (simulation_.surfaces()) {
+  if (simulation_.immersed()) {
     // Of the flow's own speed, prescribed or computed: the solvers' reference may be that of a membrane's return to its shape.
     errors["slip"] = now.slip_speed / std::max({simulation_.fluid().boundaries().largest_speed(), now.speed, 1e-30});
     const auto& search = now.immersed;
@@ -351,8 +351,10 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   if (simulation_.membranes()) {
     errors["volume_drift"] = now.volume_drift;
     errors["area_drift"] = now.area_drift;
-    errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
-    errors["coupling_residual_max"] = now.residual.largest;
+    if (simulation_.immersed()) {
+      errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
+      errors["coupling_residual_max"] = now.residual.largest;
+    }
     report.extra["stability"] = simulation_.coupling()->report(simulation_.last_step_us());
   }
   fill_energy(report);
@@ -384,7 +386,7 @@ void FlowOutput::fill(Report& report) {
   fill_totals(report, totals_now());
   auto& errors = report.errors;
   errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
-  if (simulation_.surfaces()) {
+  if (simulation_.immersed()) {
     const auto fits = simulation_.immersed()->traction_fits();
     report.extra["immersed"]["traction_fits"] = fits;
     errors["traction_fallbacks"] = poor_share(fits);

@@ -38,7 +38,7 @@ void tell_missing(const Case& scene, const std::string& checkpoint, const std::s
   const auto expect = [&](bool written, const char* name) {
     if (written && !fs::exists(fs::path(folder) / name)) missing.emplace_back(name);
   };
-  expect(simulation.immersed() != nullptr, "history.csv");
+  expect(simulation.coupling() != nullptr, "history.csv");
   expect(scene.output.fields, "fields.h5");
   expect(scene.output.cells && simulation.surfaces(), "cells.h5");
   if (missing.empty()) return;
@@ -54,10 +54,13 @@ void tell_missing(const Case& scene, const std::string& checkpoint, const std::s
 
 void print_coupling(FlowSimulation& simulation) {
   if (!simulation.membranes()) return;
-  const auto s = *simulation.coupling()->stability(simulation.next_step_us());
+  const double dt = simulation.next_step_us();
+  const auto estimate = simulation.coupling()->stability(dt);
+  if (!estimate) return info("{}", simulation.coupling()->stability_text(dt));
+  const StabilityEstimate& s = *estimate;
   info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
        s.mass_term, s.beta, s.threshold(), s.margin());
-  const int substeps = simulation.membranes()->substeps(simulation.next_step_us(), s.beta);
+  const int substeps = simulation.membranes()->substeps(dt, s.beta);
   if (substeps > 1)
     info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
          simulation.membranes()->stable_step_us());

@@ -48,7 +48,9 @@ ModuleList list_modules(const Case& scene, int ranks) {
   const bool files = outputs_left_out(scene.output).empty();
   add("fluid", fluid);
   add("convection", fluid && scene.fluid->convection != FluidSettings::Convection::none);
-  add("immersed search", fluid && (cells || bodies));
+  const bool force = fluid && cells && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
+  add("immersed search", fluid && ((cells && !force) || bodies));
+  add("transfer of forces", force);
   add("rigid bodies", bodies);
   add("membrane", cells);
   add("membrane viscosity", viscous);

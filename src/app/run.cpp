@@ -34,6 +34,7 @@ void print_start(const Comm& comm, const Case& scene) {
        comm.size() == 1 ? "" : "s", thread_count(), thread_count() == 1 ? "" : "s");
   print_modules(list_modules(scene, comm.size()));
   for (const auto& line : outputs_left_out(scene.output)) warn("{}", line);
+  for (const auto& line : scene.remarks) warn("{}", line);
   print_cell_types(scene);
   print_surfaces(scene);
 }
@@ -220,7 +221,12 @@ void check_case(const Comm& comm, const RunOptions& options) {
   size.vertices = simulation.surfaces() ? simulation.surfaces()->vertices : 0;
   size.steps = static_cast<double>(simulation.steps_left());
   size.cores = static_cast<double>(comm.size()) * thread_count();
-  if (simulation.membranes()) {
+  const std::string stability = simulation.coupling() ? simulation.coupling()->stability_text(simulation.next_step_us()) : "";
+  if (!stability.empty()) {
+    info("{}", stability);
+    size.membrane_vertices = size.vertices;
+    size.substeps = 1;
+  } else if (simulation.membranes()) {
     const auto s = *simulation.coupling()->stability(simulation.next_step_us());
     info("coupling: margin of stability {:.2f} (M / (A dt) + beta = {:.3g} + {:.3g}, half the fluid's reaction {:.3g} pg/um2/us)",
          s.margin(), s.mass_term, s.beta, s.threshold());

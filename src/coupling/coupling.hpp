@@ -43,8 +43,10 @@ class Coupling {
   virtual const Components<double>& tractions_for_output() = 0;
   /// Which bodies the grid resolves coarsely, as check_start() warned of; "" if none.
   virtual std::string coarse() const { return {}; }
-  /// For a step of that length; nothing where no membrane is coupled.
+  /// For a step of that length; nothing where no membrane with mass is coupled.
   virtual std::optional<StabilityEstimate> stability(double) const { return std::nullopt; }
+  /// What there is to say of it where there is no such estimate; "" if nothing.
+  virtual std::string stability_text(double) const { return {}; }
 
   /// Whether a cell is so near to an outflow that the run should end before another step of that length, and which cell
   /// and where, for messages (all ranks call). Nearer, the end of the grid disturbs the flow; beyond it there is none.
@@ -61,6 +63,13 @@ class Coupling {
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
 
+  /// How far each body has been moved back by whole periods since the start, um; copies to the host.
+  virtual std::vector<Triple> wrapped_by() const = 0;
+  /// Of the fluid on the cells, nW, where no tractions tell.
+  virtual double power_on_cells() { return 0; }
+  /// Friction beside the membranes that the grid does not show, nW.
+  virtual double unresolved_dissipation() { return 0; }
+
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.
   virtual Membranes* membranes() { return nullptr; }
@@ -68,6 +77,10 @@ class Coupling {
   /// The search and the flow at surfaces that cut the grid; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
 };
+
+/// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to
+/// its shape. Tolerances relative to the speed of a flow at rest would ask for less than round-off.
+double negligible_speed(const Case& scene, double viscosity);
 
 /// The coupling that a case with cells or bodies asks for.
 /// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them

@@ -32,7 +32,8 @@ std::optional<double> share(double left_over, double scale) {
 void EnergyBalance::sample(double elastic_fJ) {
   const SurfaceSet* surfaces = simulation_.surfaces();
   FluidSolver& fluid = simulation_.fluid();
-  const FluidEnergy flow = flow_energy(fluid, surfaces ? enclosed_volume(*surfaces) : 0.0);
+  const bool cut = simulation_.immersed() != nullptr;  // fluid outside bodies only
+  const FluidEnergy flow = flow_energy(fluid, cut ? enclosed_volume(*surfaces) : 0.0);
   EnergyTotals now;
   now.boundaries = flow.boundaries_nW;
   now.gradient = flow.gradient_nW;
@@ -41,17 +42,20 @@ void EnergyBalance::sample(double elastic_fJ) {
   // Power over flow means nothing where all but nothing flows through: beside walls and inlets that only slide along.
   const double through = 1e-3 * fluid.statistics().reference_speed * std::pow(fluid.grid().total_volume(), 2.0 / 3);
   state_.driving_pressure = flow.inflow_um3_per_us > through ? flow.boundaries_nW / flow.inflow_um3_per_us : 0;
-  if (surfaces) {
+  if (cut) {
     const auto& stress = simulation_.immersed()->last_stress();
     const int of_cells = simulation_.membranes() ? simulation_.membranes()->vertices() : 0;
     if (of_cells > 0) now.on_cells = fluid_power(*surfaces, stress, 0, of_cells);
     if (of_cells < surfaces->vertices) now.on_bodies = fluid_power(*surfaces, stress, of_cells, surfaces->vertices);
     now.dissipation -= fluid.viscosity() * surface_gradient_work(*surfaces);
+  } else if (surfaces) {
+    now.on_cells = simulation_.coupling()->power_on_cells();
+    now.dissipation += simulation_.coupling()->unresolved_dissipation();
   }
   if (auto* membranes = simulation_.membranes()) {
     now.elastic = elastic_fJ;
     now.membrane_dissipation = membranes->dissipation_nW();
-    now.membrane_kinetic = membranes->kinetic_energy_fJ();
+    if (cut) now.membrane_kinetic = membranes->kinetic_energy_fJ();
   }
   if (state_.samples == 0) {
     state_.first = now;

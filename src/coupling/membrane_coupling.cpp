@@ -3,6 +3,7 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "core/units.hpp"
+#include "coupling/force_coupling.hpp"
 #include "immersed/surface_motion.hpp"
 #include "membrane/interface.hpp"
 
@@ -19,21 +20,19 @@ Components<double> vertex_vectors(const char* name, int vertices) {
   return Components<double>(std::string("corpuscle::coupling::") + name, vertices, 3);
 }
 
-/// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to
-/// its shape. Tolerances relative to the speed of a flow at rest would ask for less than round-off.
-double negligible_speed(const Case& scene, double viscosity) {
-  constexpr double share = 1e-4;
-  double modulus = 0;
-  for (const auto& cell : scene.cells) modulus = std::max(modulus, cell.shear_modulus_uN_per_m * units::uN_per_m);
-  return share * modulus / viscosity;
-}
-
 bool uses_robin(const CouplingSettings& coupling) {
   return coupling.scheme == CouplingSettings::Scheme::robin ||
          (coupling.scheme == CouplingSettings::Scheme::iterated && coupling.robin_in_iterated);
 }
 
 }  // namespace
+
+double negligible_speed(const Case& scene, double viscosity) {
+  constexpr double share = 1e-4;
+  double modulus = 0;
+  for (const auto& cell : scene.cells) modulus = std::max(modulus, cell.shear_modulus_uN_per_m * units::uN_per_m);
+  return share * modulus / viscosity;
+}
 
 MembraneCoupling::MembraneCoupling(const Case& scene, FluidSolver& fluid, Timers& timers)
     : SharpCoupling(scene, fluid, timers,
@@ -271,6 +270,8 @@ std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& s
   std::unique_ptr<Coupling> coupling;
   if (scene.cells.empty())
     coupling = std::make_unique<SharpCoupling>(scene, fluid, timers, nullptr);
+  else if (scene.coupling->scheme == CouplingSettings::Scheme::force)
+    coupling = std::make_unique<ForceCoupling>(scene, schedule, fluid, timers);
   else if (scene.coupling->scheme == CouplingSettings::Scheme::iterated)
     coupling = std::make_unique<IteratedCoupling>(scene, fluid, timers);
   else

@@ -160,16 +160,19 @@ FluidState read_fluid(const CheckpointReader& file, FlowSimulation& simulation) 
 }
 
 /// Nodes are classified as they were in the last step, and then the surfaces put where that step left them.
-void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation, bool cells_changed) {
+void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
   const SurfaceSet& surfaces = *simulation.surfaces();
   std::vector<double> positions(3 * static_cast<std::size_t>(surfaces.vertices));
   file.read("classified_positions", {positions.size() / 3, 3}, positions.data());
   simulation.immersed()->resume(positions);
-  if (simulation.immersed()->boundary().periodic()) {
-    auto laps = simulation.immersed()->boundary().laps_state();
-    file.read("laps", {laps.size()}, laps.data());
-    simulation.immersed()->boundary().set_laps_state(laps);
-  }
+  if (!simulation.immersed()->boundary().periodic()) return;
+  auto laps = simulation.immersed()->boundary().laps_state();
+  file.read("laps", {laps.size()}, laps.data());
+  simulation.immersed()->boundary().set_laps_state(laps);
+}
+
+void read_coupling(const CheckpointReader& file, FlowSimulation& simulation, bool cells_changed) {
+  if (simulation.immersed()) read_surfaces(file, simulation);
   // Another scheme than that of the checkpoint starts without a history of its own.
   auto coupling = simulation.coupling()->state();
   if (!coupling.empty() && file.has("coupling") && file.shape("coupling") == Shape{coupling.size()}) {
@@ -199,7 +202,7 @@ Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, co
   file.read("history_levels", {1}, &levels);
   const bool cells_changed = std::any_of(restored.changes.begin(), restored.changes.end(),
                                          [](const CaseChange& change) { return change.key.rfind("cell", 0) == 0; });
-  if (simulation.immersed()) read_surfaces(file, simulation, cells_changed);
+  if (simulation.coupling()) read_coupling(file, simulation, cells_changed);
   try {
     simulation.resume({file.header().time_us, numbers[1], file.header().step});
   } catch (const InputError& error) {

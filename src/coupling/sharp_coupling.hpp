@@ -15,6 +15,7 @@ class SharpCoupling : public Coupling {
   void resume(double time_us) override;
   const Components<double>& tractions_for_output() override;
   std::string coarse() const override { return coarse_; }
+  std::vector<Triple> wrapped_by() const override { return immersed_->wrapped_by(); }
 
   const SurfaceSet& surfaces() const override { return *surfaces_; }
   Membranes* membranes() override { return membranes_.get(); }

@@ -188,10 +188,12 @@ void FluidSolver::assemble_history(double time) {
 }
 
 void FluidSolver::make_flux(const EmbeddedBodies* bodies) {
-  if (skewed_)
-    interpolate_flux<true>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
-  else
-    interpolate_flux<false>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_);
+  with_face_force([&](const auto& force) {
+    if (skewed_)
+      interpolate_flux<true>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_, force);
+    else
+      interpolate_flux<false>(grid_->views(), g_.normal, kind_, mask_, diagonal_, u_, p_, grad_p_, flux_, force);
+  });
   boundaries_.close_moving_walls(flux_);
   const double growth = bodies && bodies->bodies > 0 ? give_bodies_their_flux(*bodies) : 0;
   if (boundaries_.has_inlet() && !boundaries_.has_outflow()) note_correction(boundaries_.balance(flux_, growth));

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 
 namespace corpuscle {
 
@@ -83,6 +84,10 @@ class FluidSolver {
   /// solve, to set it and the given boundary velocities. For manufactured solutions and user forces.
   void set_body_force(const Components<double>& force, std::function<void(double)> update);
 
+  /// A force on faces, in every solve from now on: what is written into the shared arrays counts. Without this call, or with
+  /// nothing, there is none and nothing is spent on it.
+  void set_face_force(const std::optional<FaceForce>& force) { face_force_ = force; }
+
   /// Residual of the momentum equation that the last projection left, over the velocity (both 2-norms): the splitting.
   /// Right after solve() only.
   double splitting();
@@ -122,6 +127,11 @@ class FluidSolver {
     use(VaryingViscosity{relative_viscosity_, grid.x, {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
   }
   template <class Use>
+  void with_face_force(const Use& use) const {
+    if (face_force_) return use(*face_force_);
+    use(NoFaceForce());
+  }
+  template <class Use>
   void with_operator(const Use& use) const;
   template <class Viscosity, class Use>
   void with_operator(const Viscosity& viscosity, const Use& use) const;
@@ -144,7 +154,7 @@ class FluidSolver {
   int history_levels_ = 0;
   int pinned_ = -1;
 
-  Components<double> u_, u_old_, u_older_, work_, history_, grad_p_;
+  Components<double> u_, u_old_, u_older_, work_, history_, grad_p_;  // grad_p_: less the force on faces
   Array<double> p_, p_old_, psi_field_, diagonal_;
   Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
   Array<NodeKind> kind_;
@@ -177,6 +187,7 @@ class FluidSolver {
   std::unique_ptr<PressureKrylov> pressure_krylov_;
   Components<double> body_force_;
   std::function<void(double)> update_force_;
+  std::optional<FaceForce> face_force_;
   FluidStatistics statistics_;
 };
 

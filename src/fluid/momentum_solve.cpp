@@ -117,7 +117,7 @@ double FluidSolver::residual_square() {
 double FluidSolver::momentum_residual() {
   const auto scope = timers_->scope("momentum");
   grid_->halo().exchange(p_);
-  pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_);
+  with_face_force([&](const auto& force) { pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_, force); });
   double squares[2] = {residual_square(), square_of(grid_->index(), u_)};
   grid_->comm().sum(squares, 2);
   residual_norm_ = std::sqrt(squares[0]);

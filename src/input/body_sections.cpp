@@ -40,16 +40,36 @@ BodySettings read_body(Section& s) {
   return b;
 }
 
+namespace {
+
+/// Keys of membranes that are forces, and of those that cut the grid.
+void read_transfer(Section& s, CouplingSettings& c) {
+  using Kernel = CouplingSettings::Kernel;
+  const std::string robin = "robin_coefficient_pg_per_um2_per_us";
+  if (c.scheme == CouplingSettings::Scheme::force) {
+    c.kernel = s.choice<Kernel>("kernel", {{"three-point", Kernel::three_point}, {"four-point", Kernel::four_point}}, c.kernel);
+    c.slip = s.flag("slip", c.slip);
+    s.unused(robin, "scheme = \"force\" has no such key: membranes move with the fluid");
+    return;
+  }
+  for (const char* key : {"kernel", "slip"})
+    s.unused(key, "only scheme = \"force\" has this key: with the others membranes cut the grid");
+  s.describe(robin, "a number, 0 or more", "pi times viscosity over grid spacing, or more where stability needs it");
+  if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative(1e12));
+}
+
+}  // namespace
+
 CouplingSettings read_coupling(Section& s) {
   using Scheme = CouplingSettings::Scheme;
   using Acceleration = CouplingSettings::Acceleration;
   CouplingSettings c;
   c.scheme = s.choice<Scheme>(
-      "scheme", {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated}},
+      "scheme",
+      {{"robin", Scheme::robin}, {"iterated", Scheme::iterated}, {"loose", Scheme::loose}, {"aitken", Scheme::iterated},
+       {"force", Scheme::force}},
       c.scheme);
-  const std::string robin = "robin_coefficient_pg_per_um2_per_us";
-  s.describe(robin, "a number, 0 or more", "pi times viscosity over grid spacing, or more where stability needs it");
-  if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative(1e12));
+  read_transfer(s, c);
   // Up to version 0.1 the scheme was called "aitken", whichever acceleration it used.
   const std::string in_iterated = s.node("robin_in_aitken") ? "robin_in_aitken" : "robin_in_iterated";
   if (c.scheme != Scheme::iterated) {

@@ -151,8 +151,9 @@ struct BodySettings {
 
 /// [coupling]
 struct CouplingSettings {
-  enum class Scheme { robin, iterated, loose };
+  enum class Scheme { robin, iterated, loose, force };
   enum class Acceleration { anderson, aitken };
+  enum class Kernel { three_point, four_point };
 
   Scheme scheme = Scheme::robin;
   double tolerance = 1e-3;              // iterated: residual over the step's displacement
@@ -160,6 +161,8 @@ struct CouplingSettings {
   std::optional<Acceleration> acceleration;  // iterated; by default Anderson's with a Robin term, Aitken's without
   double robin_coefficient = -1;        // beta, pg/um2/us; negative: pi mu / h (see MembraneCoupling::stability)
   bool robin_in_iterated = true;
+  Kernel kernel = Kernel::three_point;  // force
+  bool slip = true;                     // force
 
   bool operator==(const CouplingSettings&) const = default;
 };
@@ -192,6 +195,7 @@ struct Case {
   std::string path;                     // of the case file
   std::string title;
   std::string resolved;                 // every key with the value used, as TOML; stored with the results
+  std::vector<std::string> remarks;     // on keys that are given and have no effect
   TimeSettings time;
   std::optional<GridSettings> grid;
   std::optional<FluidSettings> fluid;

@@ -71,7 +71,9 @@ std::vector<CaseChange> case_changes(const std::string& before, const std::strin
   std::vector<CaseChange> changes;
   const auto note = [&](const std::string& key, const std::string& old_value, const std::string& new_value) {
     if (old_value == new_value || only_of_the_run(key) || other_path(key, old_value, new_value)) return;
-    changes.push_back({key, old_value, new_value, is_geometry(key)});
+    // Membranes as forces have fluid inside, others have none.
+    const bool other_fluid = key == "coupling.scheme" && (old_value == "\"force\"" || new_value == "\"force\"");
+    changes.push_back({key, old_value, new_value, is_geometry(key) || other_fluid});
   };
   const auto find = [](const Values& values, const std::string& key) {
     return std::find_if(values.begin(), values.end(), [&](const auto& value) { return value.first == key; });

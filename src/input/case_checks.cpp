@@ -38,6 +38,17 @@ void check_tube_sides(const Case& scene, const Complaint& complain) {
   }
 }
 
+/// What membranes that are forces do not have yet.
+void check_force_scheme(const Case& scene, const Complaint& complain) {
+  if (!scene.bodies.empty())
+    complain("bodies", "",
+             "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
+  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+    if (scene.cells[c].membrane_viscosity_N_s_per_m > 0)
+      complain(scene.cells[c].type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", scene.cells[c].type),
+               "membrane_viscosity_N_s_per_m", "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
+}
+
 /// Whether each part of the gradient has periodic sides to drive fluid between, on grids whose index directions are x, y, z;
 /// on others their geometry decides, see check_pressure_gradient().
 void check_gradient(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
@@ -109,6 +120,7 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (!scene.grid) complain("fluid", "", "a fluid needs a [grid]");
   if (scene.coupling && scene.cells.empty())
     complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
+  if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) check_force_scheme(scene, complain);
   check_boundaries(scene, complain);
 }
 

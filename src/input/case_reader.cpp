@@ -45,6 +45,7 @@ class CaseReader {
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
     if (root_.contains("stretching")) scene.stretching = one<StretchingSettings>("stretching", read_stretching);
     check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
+    if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) note_without_effect(scene);
     read_time_section(scene);
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
@@ -106,6 +107,26 @@ class CaseReader {
     if (!root_.contains("time"))
       throw InputError(source_.file + ": section [time] is missing; it needs step_us and end_us");
     scene.time = one<TimeSettings>("time", read_time);
+  }
+
+  /// Keys of cells that membranes as forces have no use for: refused, they would have to be taken out of a case to try it with
+  /// this coupling.
+  void note_without_effect(Case& scene) const {
+    for (const auto& [key, why] : {std::pair{"mass_pg", "membranes have no mass of their own"},
+                                   {"interior", "the fluid is inside the cells as well, as viscous as outside"}}) {
+      std::string first;
+      int others = -1;
+      for (const char* list : {"cell_types", "cells"}) {
+        const auto* entries = root_.contains(list) ? root_.get(list)->as_array() : nullptr;
+        for (std::size_t n = 0; entries && n < entries->size(); ++n) {
+          const auto* found = entries->get(n)->as_table()->get(key);
+          if (found && ++others == 0) first = fmt::format("{}.{}.{} = {}", list, n, key, toml_text(*found));
+        }
+      }
+      if (others < 0) continue;
+      scene.remarks.push_back(fmt::format("{}{} has no effect with coupling.scheme = \"force\": {}", first,
+                                          others > 0 ? fmt::format(" (and {} more)", others) : "", why));
+    }
   }
 
   template <class Settings, class Read>

@@ -7,6 +7,7 @@
 
 #include "core/error.hpp"
 #include "membrane/copies.hpp"
+#include "membrane/drift.hpp"
 #include "membrane/membrane_setup.hpp"
 #include "membrane/membrane_viscosity.hpp"
 #include "membrane/stiffness.hpp"
@@ -168,6 +169,51 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
   explain(cell, dt_us);
 }
 
+void Membranes::set_out(double ahead_us) {
+  drifts_ = true;
+  copy_motion(views_.vertices, views_.surface.x, views_.surface.v, start_x_, start_v_);
+  if (ahead_us > 0) move_along(views_.vertices, start_x_, start_v_, ahead_us, views_.surface.x);
+}
+
+void Membranes::drift(double dt, double share) {
+  if (views_.cells == 0) return;
+  Kokkos::deep_copy(views_.status, 0);
+  measure_drift(views_, motion_);
+  project_and_drift(views_, motion_, start_x_, start_v_, share, dt);
+  measure_membranes(views_, views_.surface.x);
+  measure_drift(views_, motion_);
+  restore_volume(views_, motion_, volume_rate * dt);
+  if (const int cell = trouble(); cell >= 0) explain(cell, 0);
+}
+
+double Membranes::fastest_relaxation_per_us(const MobilityModel& model) {
+  const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
+  std::vector<int> first_of_type;
+  for (int c = 0; c < views_.cells; ++c)
+    if (type(c) == static_cast<int>(first_of_type.size())) first_of_type.push_back(c);
+  return fastest_relaxation(model, first_of_type);
+}
+
+/// Power iteration on mobility times stiffness, for some of the cells.
+double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells) {
+  constexpr double distance = 1e-4;  // um, as for the stiffness
+  const StiffnessViews work = make_stiffness_views(views_);
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
+  start_mode(views_, work);
+  for (int i = 0; i < power_iterations; ++i) {
+    displace(views_, work, distance);
+    elasticity_->membrane_forces(views_, work.probe, work.force_ahead);
+    displace(views_, work, -distance);
+    elasticity_->membrane_forces(views_, work.probe, work.force_behind);
+    difference_forces(views_, work, distance);
+    for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
+  }
+  const auto sums = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), work.sums);
+  double fastest = 0;
+  for (int c : cells) fastest = std::max(fastest, std::sqrt(sums(c * sections, 0)));
+  return fastest;
+}
+
 int Membranes::trouble() {
   return status_host_.read()(0) - 1;
 }
@@ -180,19 +226,20 @@ void Membranes::explain(int cell, double dt) {
   const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
   const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", cell, before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
+  const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
   const std::string step =
       dt > 0 ? fmt::format(" within a step of {:.3g} us, even in {} times as many sub-steps", dt, 1 << most_retries)
              : std::string();
   if (finite) {
     throw ComputationError(fmt::format(
         "membrane overstretched: {}: {}{} ({} before). The load is too large or the coupling unstable: reduce time.step_us or the "
-        "load, or raise its shear_modulus_uN_per_m or coupling.robin_coefficient_pg_per_um2_per_us",
-        where, reached, step, was));
+        "load, or raise its shear_modulus_uN_per_m{}",
+        where, reached, step, was, robin));
   }
   throw ComputationError(fmt::format(
       "membrane position is not finite: {}{} ({} before). The traction on it is not finite or the step too long: reduce "
-      "time.step_us, or raise its mass_pg or coupling.robin_coefficient_pg_per_um2_per_us",
-      where, step, was));
+      "time.step_us{}{}",
+      where, step, was, drifts_ ? "" : ", or raise its mass_pg", robin));
 }
 
 void Membranes::save_state() {

@@ -8,6 +8,7 @@
 #include "immersed/surface.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/membrane_views.hpp"
+#include "membrane/mobility.hpp"
 #include "membrane/motion.hpp"
 #include "membrane/reference.hpp"
 
@@ -83,6 +84,18 @@ class Membranes {
   int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0,
               const Components<double>& v_star = {});
 
+  /// Begin a step of membranes that move with the fluid: put them where their last velocities bring them in `ahead_us`.
+  void set_out(double ahead_us);
+  /// End it: move all cells by `dt_us`, from where they were, with `share` of their last velocities and the rest of those that
+  /// surfaces().v holds, of the fluid around, once these are projected so that they change no volume. Volumes are V0 then. After
+  /// compute_forces() at the present positions.
+  /// @throws ComputationError  if a position is not finite
+  void drift(double dt_us, double share);
+
+  /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over all types of cells, 1/us.
+  /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
+  double fastest_relaxation_per_us(const MobilityModel& model);
+
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
   void save_state();
   void restore_state();
@@ -115,6 +128,7 @@ class Membranes {
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
+  double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells);
   [[noreturn]] void explain(int cell, double dt);
 
   MembraneViews views_;
@@ -128,6 +142,7 @@ class Membranes {
   std::vector<double> stiffness_;                // [cell] largest eigenvalue, nN/um; empty before the first estimate
   std::vector<double> rest_area_, rest_volume_;  // [cell]
   long calls_ = 0;                               // of advance
+  bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()
   std::unique_ptr<Snapshot> saved_;
   std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any
 };

@@ -166,6 +166,18 @@ TEST_CASE("cells have what their type says, and the echo keeps types") {
   require_same(scene, read_echo(scene));
 }
 
+TEST_CASE("keys without effect on membranes that are forces are remarked upon") {
+  REQUIRE(read("straight_tube.toml").remarks.empty());
+  const auto scene = read("straight_tube.toml", {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"});
+  REQUIRE(scene.remarks.size() == 2);
+  REQUIRE(scene.remarks[0] == "cells.0.mass_pg = 100 has no effect with coupling.scheme = \"force\": membranes have no mass of their own");
+  REQUIRE(scene.remarks[1].rfind("cells.0.interior = \"empty\" has no effect", 0) == 0);
+  require_same(scene, read_echo(scene));
+  const auto typed = typed_case({"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cell_types.1.mass_pg=30"});
+  REQUIRE(typed.remarks.size() == 2);
+  REQUIRE(typed.remarks[0].rfind("cell_types.1.mass_pg = 30 (and 1 more) has no effect", 0) == 0);
+}
+
 TEST_CASE("a restart lists changed laws and constants of types, and refuses other shapes") {
   const auto before = typed_case();
   using Keys = std::vector<std::string>;
@@ -180,6 +192,12 @@ TEST_CASE("a restart lists changed laws and constants of types, and refuses othe
   REQUIRE(changed_keys(before, typed_case({"cell_types.0.diameter_um=6"}), true) == Keys{"cell_types.0.diameter_um"});
   REQUIRE(changed_keys(before, typed_case({"cell_types.0.vertices=500"}), true) == Keys{"cell_types.0.vertices"});
   REQUIRE(changed_keys(before, typed_case({"cells.3.type=capsule"}), true) == Keys{"cells.3.type"});
+  // Membranes as forces have fluid inside; the others differ in how they move only.
+  const auto sharp = typed_case({"cells.0.membrane_viscosity_N_s_per_m=0"});
+  const auto force = typed_case({"cells.0.membrane_viscosity_N_s_per_m=0", "coupling.scheme=force"});
+  REQUIRE(changed_keys(sharp, force, true) == Keys{"coupling.scheme"});
+  REQUIRE(changed_keys(force, sharp, true) == Keys{"coupling.scheme"});
+  REQUIRE(changed_keys(before, typed_case({"coupling.scheme=iterated"}), true).empty());
 }
 
 TEST_CASE("a flow with cells but no [coupling] is coupled by robin") {

@@ -249,6 +249,15 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell(from_file + "recenter = 1"), {":13: cells.0.recenter = 1", "true or false"});
   require_parts(cell(from_file + "recentre = true"), {":13: cells.0.recentre", "did you mean 'recenter'?"});
   require_parts(cell("[coupling]\nscheme = \"strong\""), {":13: coupling.scheme", "\"robin\", \"iterated\", \"loose\""});
+  const std::string force = "[coupling]\nscheme = \"force\"\n";
+  REQUIRE(cell(force + "kernel = \"four-point\"\nslip = false") == "accepted");
+  require_parts(cell(force + "kernel = \"two-point\""), {":14: coupling.kernel", "\"three-point\", \"four-point\""});
+  for (const char* key : {"tolerance = 0.001", "max_iterations = 10", "robin_in_iterated = true", "acceleration = \"aitken\""})
+    require_parts(cell(force + key), {":14: coupling." + std::string(key), "only scheme = \"iterated\""});
+  require_parts(cell(force + "robin_coefficient_pg_per_um2_per_us = 1"), {":14: coupling.robin_coefficient", "move with the fluid"});
+  for (const char* key : {"kernel = \"three-point\"", "slip = true"})
+    require_parts(cell("[coupling]\n" + std::string(key)), {":13: coupling." + std::string(key), "only scheme = \"force\""});
+  require_parts(cell("membrane_viscosity_N_s_per_m = 1e-7\n" + force), {":12: cells.0.membrane_viscosity_N_s_per_m", "must be 0"});
   require_parts(cell("[coupling]\nscheme = \"iterated\"\ntolerance = 1"), {":14: coupling.tolerance = 1", "from 1e-12 to 0.5"});
   for (const char* key : {"tolerance = 1e-4", "max_iterations = 5", "acceleration = \"aitken\"", "robin_in_iterated = false"})
     require_parts(cell("[coupling]\n" + std::string(key)),
@@ -282,6 +291,8 @@ TEST_CASE("cells and bodies are checked") {
   REQUIRE(body("shape = \"file\"\nfile = \"" + surface + "\"\nscale = 0.001\nrecenter = true\naxis = [0, 1, 0]") == "accepted");
   fs::remove(surface);
   require_parts(body("shape = \"sphere\"\nradius_um = 1\n[coupling]"), {":14: coupling: there are no [[cells]]"});
+  require_parts(body("shape = \"sphere\"\nradius_um = 1\n[[cells]]\ncenter_um = [2, 2, 2]\n[coupling]\nscheme = \"force\""),
+                {"bodies: there are no rigid bodies beside membranes"});
 }
 
 TEST_CASE("shapes, laws and resting states of cells take their own keys only") {

@@ -56,6 +56,8 @@ TEST_CASE("keys are listed with default, range and where they belong") {
   CHECK_THAT(find("cells", "scale")->only, Contains("mesh file"));
   CHECK_THAT(find("boundary", "radial_table")->only, Contains("table"));
   CHECK_THAT(find("coupling", "tolerance")->only, Contains("iterated"));
+  CHECK_THAT(find("coupling", "kernel")->only, Contains("force"));
+  CHECK_THAT(find("coupling", "robin_coefficient_pg_per_um2_per_us")->only, Contains("force"));
   CHECK(find("boundary", "side")->only.empty());
   for (const auto& [section, key] : {std::pair{"fluid", "convection"}, {"output", "fields"}, {"boundary", "velocity_mm_per_s"},
                                      {"coupling", "robin_coefficient_pg_per_um2_per_us"}, {"stretching", "experiment"}, {"bodies", "semi_axes_um"}})

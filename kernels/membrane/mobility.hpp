@@ -1,0 +1,55 @@
+// How fast a membrane that moves with the fluid relaxes: an estimate, from forces to velocities without solving the flow.
+#pragma once
+
+#include "membrane/stiffness.hpp"
+
+namespace corpuscle {
+
+/// Vertices as blobs in an unbounded fluid (Rotne & Prager, J. Chem. Phys. 50, 1969; Yamakawa, ibid. 53, 1970), and a slip of
+/// `slip` times the tangential force per area.
+struct MobilityModel {
+  double viscosity = 1;  // mPa s
+  double radius = 1;     // um, of a blob
+  double slip = 0;       // um
+};
+
+KOKKOS_INLINE_FUNCTION Vec3 blob_velocity(const MobilityModel& model, const Vec3& r, const Vec3& f) {
+  const double pi = 3.14159265358979323846, a = model.radius, distance = norm(r);
+  if (distance < 2 * a) {
+    const double along = distance > 0 ? 3 * dot(r, f) / (32 * a * distance) : 0;
+    return (1 / (6 * pi * model.viscosity * a)) * ((1 - 9 * distance / (32 * a)) * f + along * r);
+  }
+  const double square = a * a / (distance * distance);
+  return (1 / (8 * pi * model.viscosity * distance)) *
+         ((1 + 2 * square / 3) * f + ((1 - 2 * square) * dot(r, f) / (distance * distance)) * r);
+}
+
+/// w.mode = the velocities that the forces w.mode [vertex, 3] give to the vertices of `cell`; w.probe is overwritten, the
+/// squared norm goes to the sums. Normals and areas must be current.
+inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility, int cell, int first, int last,
+                           const StiffnessViews& w) {
+  const MobilityModel model = mobility;
+  const auto x = m.surface.x, normal = m.surface.normal;
+  const auto area = m.surface.area;
+  Kokkos::parallel_for(
+      "corpuscle::membrane::mobility", Policy(first, last), KOKKOS_LAMBDA(int i) {
+        const Vec3 at = load(x, i), f = load(w.mode, i), n = load(normal, i);
+        Vec3 v = (model.slip / (model.viscosity * area(i))) * (f - dot(f, n) * n);
+        for (int j = first; j < last; ++j) v += blob_velocity(model, at - load(x, j), load(w.mode, j));
+        store(w.probe, i, v);
+      });
+  double total = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::mobility_norm", Policy(first, last),
+      KOKKOS_LAMBDA(int i, double& sum) {
+        const Vec3 v = load(w.probe, i);
+        store(w.mode, i, v);
+        sum += dot(v, v);
+      },
+      total);
+  Kokkos::parallel_for(
+      "corpuscle::membrane::mobility_sums", Policy(0, sections),
+      KOKKOS_LAMBDA(int s) { w.sums(cell * sections + s, 0) = s == 0 ? total : 0; });
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,37 @@
+// Regularised delta functions of one index coordinate: what a point gives to, and takes from, the grid points near it. Their
+// values at all integers add up to one and their first moment about the point vanishes, wherever it is.
+#pragma once
+
+#include <Kokkos_Core.hpp>
+#include <cmath>
+
+namespace corpuscle {
+
+/// Roma, Peskin & Berger, J. Comput. Phys. 153, 1999.
+struct ThreePointDelta {
+  static constexpr int points = 3;
+  static constexpr double reach = 1.5;
+  /// The first of the integers near t.
+  KOKKOS_INLINE_FUNCTION static int first(double t) { return static_cast<int>(std::floor(t + 0.5)) - 1; }
+  KOKKOS_INLINE_FUNCTION static double value(double r) {
+    const double a = std::fabs(r);
+    if (a <= 0.5) return (1 + std::sqrt(1 - 3 * a * a)) / 3;
+    const double under = 1 - 3 * (1 - a) * (1 - a);
+    return (5 - 3 * a - std::sqrt(under > 0 ? under : 0)) / 6;
+  }
+};
+
+/// Peskin, Acta Numerica 11, 2002.
+struct FourPointDelta {
+  static constexpr int points = 4;
+  static constexpr double reach = 2;
+  KOKKOS_INLINE_FUNCTION static int first(double t) { return static_cast<int>(std::floor(t)) - 1; }
+  KOKKOS_INLINE_FUNCTION static double value(double r) {
+    const double a = std::fabs(r);
+    if (a <= 1) return (3 - 2 * a + std::sqrt(1 + 4 * a - 4 * a * a)) / 8;
+    const double under = -7 + 12 * a - 4 * a * a;
+    return (5 - 2 * a - std::sqrt(under > 0 ? under : 0)) / 8;
+  }
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,68 @@
+// Markers: the points that pass forces to the grid and take velocities from it. A vertex has a marker in every place where
+// its kernel touches faces of this rank: itself, and copies moved by periods. So no kernel knows of periods or ranks.
+#pragma once
+
+#include "immersed/lattice.hpp"
+
+namespace corpuscle {
+
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 310 bytes.
+struct MarkerViews {
+  int count = 0;
+  Array<int> vertex;            // [marker] where it comes from
+  Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex, of all ranks, that lies in its rank's own cells
+  Table<double> eta;            // [marker, 3] position in index space: cells of this rank at 0, 1, ...; walls half a cell away
+  Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
+  Table<double> weight;         // [marker, 6 points] of those lines of points
+  Table<double> inverse;        // [marker, 9] of the matrix of face areas that it sees, 1/um2
+  Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
+  Components<double> velocity;  // [marker, 3] um/us: its share of its vertex's
+  Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
+  Array<int> order;             // markers by cell, in each cell in the order of their numbers
+  Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces
+};
+
+/// The rank's block as markers see it.
+struct TransferBlock {
+  Lattice lattice;
+  Components<double> area[3];
+  /// [direction][end][0: other velocities, 1: the normal one] by which a velocity is reflected beyond a side: -1 where the side
+  /// gives it, +1 where it gives the derivative.
+  double reflection[3][2][2];
+
+  KOKKOS_INLINE_FUNCTION const IndexSpace& index() const { return lattice.index; }
+  /// Number of cells (or faces) along e that belong to this rank.
+  KOKKOS_INLINE_FUNCTION int rows(int e, bool faces) const {
+    return index().n[e] + (faces && lattice.boundary_above[e] ? 1 : 0);
+  }
+  KOKKOS_INLINE_FUNCTION bool owns(int e, bool faces, int row) const { return row >= 0 && row < rows(e, faces); }
+};
+
+/// The points along one direction that a marker reaches.
+template <class Delta>
+struct DeltaLine {
+  int base = 0;
+  double weight[Delta::points];
+  int row[Delta::points];  // the point itself, or its mirror image if it lies beyond a side
+  int end[Delta::points];  // of the side that it lies beyond: 0 low, 1 high; -1 for none
+};
+
+template <class Delta>
+KOKKOS_INLINE_FUNCTION DeltaLine<Delta> delta_line(const TransferBlock& block, int e, bool faces, double eta) {
+  const int n = block.index().n[e];
+  const double t = faces ? eta + 0.5 : eta;
+  DeltaLine<Delta> line;
+  line.base = Delta::first(t);
+  for (int p = 0; p < Delta::points; ++p) {
+    const int i = line.base + p;
+    line.weight[p] = Delta::value(i - t);
+    line.row[p] = i;
+    line.end[p] = -1;
+    if (block.lattice.boundary_below[e] && i < 0) line.row[p] = faces ? -i : -1 - i, line.end[p] = 0;
+    if (block.lattice.boundary_above[e] && i > (faces ? n : n - 1))
+      line.row[p] = faces ? 2 * n - i : 2 * n - 1 - i, line.end[p] = 1;
+  }
+  return line;
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,232 @@
+// Forces to faces, fluxes to velocities. With the weights phi of the faces of direction d around a marker, a marker's velocity
+// is the one whose fluxes through them, phi-averaged, are those of the fluid: S_d . U = sum phi flux, S_d = sum phi S. So a
+// uniform velocity is exact on any grid. A force goes the same way back: Q = phi q_d across each face with sum q_d S_d = f, a
+// difference of pressure, and f . U = sum Q flux.
+#pragma once
+
+#include "fluid/masked_gradient.hpp"
+#include "transfer/marker_views.hpp"
+
+namespace corpuscle {
+
+/// Calls visit(cell number, product of the weights, row along each direction, ends) for the faces of direction d that a marker
+/// reaches, those beyond a side by the faces they mirror.
+template <class Delta, class Visit>
+KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double (&eta)[3], int d, const Visit& visit) {
+  DeltaLine<Delta> line[3];
+  for (int e = 0; e < 3; ++e) line[e] = delta_line<Delta>(block, e, e == d, eta[e]);
+  for (int k = 0; k < Delta::points; ++k)
+    for (int j = 0; j < Delta::points; ++j)
+      for (int i = 0; i < Delta::points; ++i) {
+        const int row[3] = {line[0].row[i], line[1].row[j], line[2].row[k]},
+                  end[3] = {line[0].end[i], line[1].end[j], line[2].end[k]};
+        visit(block.index().cell(row[0], row[1], row[2]), line[0].weight[i] * line[1].weight[j] * line[2].weight[k], row, end);
+      }
+}
+
+/// base, weight and inverse of every marker. Weights of points beyond a side are folded back: reflected where the side gives
+/// the velocity (no slip is then exact, and a force keeps its moment about the wall, which takes the rest of it), added where
+/// it gives the derivative.
+template <class Delta>
+void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::prepare_markers", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        constexpr int points = Delta::points;
+        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        for (int e = 0; e < 3; ++e)
+          for (int faces = 0; faces < 2; ++faces) {
+            const DeltaLine<Delta> line = delta_line<Delta>(block, e, faces == 1, eta[e]);
+            double folded[points] = {};
+            for (int p = 0; p < points; ++p) {
+              const int to = line.row[p] - line.base;  // out of range where the weight is zero
+              if (to >= 0 && to < points)
+                folded[to] += line.end[p] < 0 ? line.weight[p] : block.reflection[e][line.end[p]][faces] * line.weight[p];
+            }
+            m.base(marker, 3 * faces + e) = static_cast<short>(line.base);
+            for (int p = 0; p < points; ++p) m.weight(marker, (3 * faces + e) * points + p) = folded[p];
+          }
+        Vec3 seen[3];
+        for (int d = 0; d < 3; ++d) {
+          Vec3 sum;
+          visit_faces<Delta>(block, eta, d,
+                             [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.area[d], c); });
+          seen[d] = sum;
+        }
+        // Columns of the inverse of the matrix with rows seen[d].
+        const DualBasis dual(seen[0], seen[1], seen[2]);
+        for (int d = 0; d < 3; ++d)
+          for (int n = 0; n < 3; ++n) m.inverse(marker, 3 * d + n) = dual.b[d][n];
+      });
+}
+
+KOKKOS_INLINE_FUNCTION Vec3 inverse_column(const MarkerViews& m, int marker, int d) {
+  return {m.inverse(marker, 3 * d), m.inverse(marker, 3 * d + 1), m.inverse(marker, 3 * d + 2)};
+}
+
+/// markers.across of the forces [vertex, 3], nN.
+inline void resolve_forces(const MarkerViews& markers, const Components<double>& force) {
+  const MarkerViews m = markers;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        const Vec3 f = load(force, m.vertex(marker));
+        for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(inverse_column(m, marker, d), f);
+      });
+}
+
+/// m.near, so that cells without markers are passed over.
+template <class Delta>
+void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  Kokkos::deep_copy(Exec(), m.near, static_cast<unsigned char>(0));
+  Kokkos::parallel_for(
+      "corpuscle::transfer::mark_near", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        int lower[3], upper[3];
+        for (int e = 0; e < 3; ++e) {
+          const int cell = m.base(marker, e), face = m.base(marker, 3 + e);
+          lower[e] = cell < face ? cell : face;
+          upper[e] = (cell < face ? face : cell) + Delta::points;
+          lower[e] = lower[e] > 0 ? lower[e] : 0;
+          upper[e] = upper[e] < block.rows(e, true) ? upper[e] : block.rows(e, true);
+        }
+        for (int k = lower[2]; k < upper[2]; ++k)
+          for (int j = lower[1]; j < upper[1]; ++j)
+            for (int i = lower[0]; i < upper[0]; ++i) m.near(block.index().cell(i, j, k)) = 1;
+      });
+}
+
+/// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
+template <class Delta>
+void spread_forces(const TransferBlock& block, const MarkerViews& markers, const FaceForce& force) {
+  const MarkerViews m = markers;
+  const IndexSpace index = block.index();
+  const FaceForce out = force;
+  constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;  // cells whose markers reach a cell or its low faces
+  for_box(
+      "corpuscle::transfer::spread_forces", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
+      KOKKOS_LAMBDA(int i, int j, int k) {
+        constexpr int points = Delta::points;
+        const int at[3] = {i, j, k}, c = index.cell(i, j, k);
+        const int last = m.near(c) ? above : below - 1;
+        double sum[3] = {0, 0, 0};
+        for (int dk = below; dk <= last; ++dk)
+          for (int dj = below; dj <= above; ++dj) {
+            const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
+            for (int s = m.start(line); s < end; ++s) {
+              const int marker = m.order(s);
+              double w[6];
+              for (int e = 0; e < 6; ++e) {
+                const int p = at[e % 3] - m.base(marker, e);
+                w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
+              }
+              sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
+              sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
+              sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
+            }
+          }
+        for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
+      });
+}
+
+/// Velocity that the sides give, where the face's point is reflected last along `last`: beyond other sides too it is itself
+/// reflected, on from the side along that direction. Exact where the velocity is linear.
+KOKKOS_INLINE_FUNCTION Vec3 given_velocity(const TransferBlock& block, const Components<double>& u, int d, int last,
+                                           const int (&row)[3], const int (&end)[3]) {
+  const IndexSpace& index = block.index();
+  Vec3 sum;
+  for (int on_side = 0; on_side < 8; ++on_side) {  // bit e: the point lies on the side along e
+    int at[3];
+    double weight = on_side >> last & 1 ? 1 : 0;
+    for (int e = 0; e < 3; ++e) {
+      const bool on = on_side >> e & 1;
+      at[e] = on ? (end[e] == 0 ? -1 : index.n[e]) : row[e];
+      if (e == last) continue;
+      const bool reflected = e > last && end[e] >= 0, given = reflected && block.reflection[e][end[e]][e == d ? 1 : 0] < 0;
+      weight *= on ? (given ? 2 : 0) : (given ? -1 : 1);
+    }
+    if (weight == 0) continue;
+    // A face across d lies between two cells, or on a side.
+    if (block.lattice.boundary_below[d] && at[d] == 0) at[d] = -1;
+    const bool on = at[d] == -1 ? block.lattice.boundary_below[d] : at[d] == index.n[d] && block.lattice.boundary_above[d];
+    const int c = index.cell(at[0], at[1], at[2]);
+    sum += weight * (on ? load(u, c) : 0.5 * (load(u, c) + load(u, c - index.stride(d))));
+  }
+  return sum;
+}
+
+/// What the given velocities of the sides add to the flux through a face beyond them, whose flux is else the mirrored face's
+/// times the product of the reflections. The velocity is reflected along one direction after the other.
+KOKKOS_INLINE_FUNCTION double given_flux(const TransferBlock& block, const Components<double>& u, int d, const int (&row)[3],
+                                         const int (&end)[3], const Vec3& area) {
+  double flux = 0, factor = 1;
+  for (int e = 0; e < 3; ++e) {
+    if (end[e] < 0) continue;
+    const double reflection = block.reflection[e][end[e]][e == d ? 1 : 0];
+    if (reflection < 0) flux += 2 * factor * dot(area, given_velocity(block, u, d, e, row, end));
+    factor *= reflection;
+  }
+  return flux;
+}
+
+/// velocity of every marker: the part that the faces of this rank give.
+/// @param u  [cell, 3] um/us, read on the sides of the block
+template <class Delta>
+void interpolate_velocity(const TransferBlock& transfer_block, const Array<double> (&flux)[3], const Components<double>& u,
+                          const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  const FaceForce through{{flux[0], flux[1], flux[2]}};
+  Kokkos::parallel_for(
+      "corpuscle::transfer::interpolate_velocity", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        constexpr int points = Delta::points;
+        const IndexSpace& index = block.index();
+        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        bool folded = false;
+        for (int e = 0; e < 3; ++e)
+          folded = folded || (block.lattice.boundary_below[e] && eta[e] < Delta::reach) ||
+                   (block.lattice.boundary_above[e] && eta[e] > index.n[e] - 1 - Delta::reach);
+        Vec3 velocity;
+        for (int d = 0; d < 3; ++d) {
+          double sum = 0;
+          for (int c = 0; c < points; ++c) {
+            const int k = m.base(marker, 2 + (d == 2 ? 3 : 0)) + c;
+            if (!block.owns(2, d == 2, k)) continue;
+            for (int b = 0; b < points; ++b) {
+              const int j = m.base(marker, 1 + (d == 1 ? 3 : 0)) + b;
+              if (!block.owns(1, d == 1, j)) continue;
+              const double w =
+                  m.weight(marker, (1 + (d == 1 ? 3 : 0)) * points + b) * m.weight(marker, (2 + (d == 2 ? 3 : 0)) * points + c);
+              for (int a = 0; a < points; ++a) {
+                const int i = m.base(marker, d == 0 ? 3 : 0) + a;
+                if (block.owns(0, d == 0, i))
+                  sum += w * m.weight(marker, (d == 0 ? 3 : 0) * points + a) * through(d, index.cell(i, j, k));
+              }
+            }
+          }
+          if (folded)
+            visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&end)[3]) {
+              const bool beyond = end[0] >= 0 || end[1] >= 0 || end[2] >= 0;
+              if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2]))
+                return;
+              sum += w * given_flux(block, u, d, row, end, load(block.area[d], c));
+            });
+          velocity += sum * inverse_column(m, marker, d);
+        }
+        store(m.velocity, marker, velocity);
+      });
+}
+
+/// v [vertex, 3] = the sum over each vertex's markers, in their order.
+inline void collect_velocity(const Array<int>& first, const MarkerViews& markers, const Components<double>& v) {
+  const MarkerViews m = markers;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::collect_velocity", Policy(0, static_cast<int>(first.extent(0)) - 1), KOKKOS_LAMBDA(int i) {
+        Vec3 sum;
+        for (int marker = first(i); marker < first(i + 1); ++marker) sum += load(m.velocity, marker);
+        store(v, i, sum);
+      });
+}
+
+}  // namespace corpuscle

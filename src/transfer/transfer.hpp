@@ -1,0 +1,56 @@
+// Forces from vertices to the grid's faces and velocities back, with one kernel and its transpose.
+#pragma once
+
+#include "fluid/masked_gradient.hpp"
+#include "grid/grid.hpp"
+#include "immersed/surface_views.hpp"
+#include "transfer/find_markers.hpp"
+#include "transfer/slip.hpp"
+
+namespace corpuscle {
+
+class Transfer {
+ public:
+  /// @param boundaries  one entry per side
+  /// @param vertices    how many place() is called with
+  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices);
+
+  /// Find the vertices' positions x [vertex, 3], um, in the grid. Must precede the calls below.
+  /// @returns the lowest vertex that is outside the grid on this rank, or -1
+  int place(const Components<double>& x);
+  /// The forces [vertex, 3], nN, onto faces().
+  void spread(const Components<double>& force);
+  /// The force on faces, with valid halos: shared with the fluid.
+  const FaceForce& faces() const { return faces_; }
+  /// Velocity of the vertices [vertex, 3], um/us, from fluxes through faces and velocities on the sides of the block: this
+  /// rank's part.
+  /// @param slip  null for none
+  void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
+                   const Components<double>& velocity);
+  /// What the slip of a membrane depends on, with this kernel's law.
+  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
+                 const Array<double>& chi = {}) const;
+
+  /// Vertices that lie in this rank's own cells, after place(). Over all ranks all of them do.
+  int at_home() const;
+  int markers() const { return markers_.count; }
+  const MarkerViews& views() const { return markers_; }
+  const TransferBlock& block() const { return block_; }
+
+ private:
+  void make_room(int markers);
+  template <class Use>
+  void with_kernel(const Use& use) const;
+
+  Grid* grid_;
+  CouplingSettings::Kernel kernel_;
+  TransferBlock block_;
+  MarkerSearch search_;
+  VertexPlaces places_;
+  HostCopy<Array<int>> beyond_host_;
+  MarkerViews markers_;
+  int room_ = 0;
+  FaceForce faces_;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,189 @@
+// coupling.scheme = "force": membranes that move with a fluid that is everywhere.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+
+#include "core/error.hpp"
+#include "coupling/energy_balance.hpp"
+#include "immersed/surface_geometry.hpp"
+#include "scenes.hpp"
+
+using namespace corpuscle;
+using namespace corpuscle::scenes;
+
+namespace {
+
+using Type = BoundarySettings::Type;
+
+/// A red cell between walls that move along x, periodic along x and z: 500 /s in 10 um, spacing 0.5 um.
+Case sheared_cell(double step_us, double end_us, bool slip) {
+  Case scene;
+  scene.time = {step_us, end_us};
+  scene.grid = cube(10, 20);
+  scene.fluid = FluidSettings{};
+  scene.fluid->convection = FluidSettings::Convection::none;
+  scene.boundaries = sides(Type::periodic);
+  for (int side : {2, 3}) {
+    scene.boundaries[side].type = Type::moving_wall;
+    scene.boundaries[side].velocity = Triple{side == 2 ? -2.5e-3 : 2.5e-3, 0, 0};
+  }
+  CellSettings cell;
+  cell.vertices = 300;
+  cell.axis = {0.3, 1, 0.2};
+  scene.cells = {cell};
+  scene.coupling = CouplingSettings{};
+  scene.coupling->scheme = CouplingSettings::Scheme::force;
+  scene.coupling->slip = slip;
+  return scene;
+}
+
+struct Run {
+  std::vector<double> x;
+  CellDiagnostics cell;
+  Triple wrapped{};
+  double imbalance = 0, coupling_imbalance = 0;
+};
+
+Run run(const Case& scene) {
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  EnergyBalance energy(simulation);
+  Run result;
+  while (!simulation.done()) {
+    simulation.step();
+    energy.sample(simulation.membranes()->diagnostics()[0].energy_fJ());
+  }
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), simulation.surfaces()->x);
+  for (std::size_t i = 0; i < x.extent(0); ++i)
+    for (int m = 0; m < 3; ++m) result.x.push_back(x(i, m));
+  result.cell = simulation.membranes()->diagnostics()[0];
+  result.wrapped = simulation.coupling()->wrapped_by()[0];
+  result.imbalance = energy.imbalance().value_or(0);
+  result.coupling_imbalance = energy.coupling_imbalance().value_or(0);
+  return result;
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b, const Triple& shift = {}) {
+  double most = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i] + shift[i % 3]));
+  return most;
+}
+
+std::string refusal(const Case& scene) {
+  try {
+    Timers timers;
+    FlowSimulation simulation(Comm(), scene, timers);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+}  // namespace
+
+TEST_CASE("a sheared cell keeps its volume, and the energy balances", "[coupling][force]") {
+  const bool slip = GENERATE(false, true);
+  const Run r = run(sheared_cell(10, 1000, slip));
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("volume {:.2e}, area {:.2e}, balance {:.2e}, of the coupling {:.2e}",
+                     r.cell.volume_um3 / r.cell.rest_volume_um3 - 1, r.cell.area_um2 / r.cell.rest_area_um2 - 1, r.imbalance,
+                     r.coupling_imbalance));
+  CHECK(r.cell.volume_um3 == Approx(r.cell.rest_volume_um3).epsilon(1e-5));
+  CHECK(r.cell.area_um2 == Approx(r.cell.rest_area_um2).epsilon(0.03));
+  CHECK(r.imbalance < 0.02);
+  CHECK(r.coupling_imbalance < 0.005);
+}
+
+TEST_CASE("membranes follow a flow that grows as well with long steps as with short ones", "[coupling][force]") {
+  // In 400 us they move by up to 0.5 um. Of first order, steps of 20 us are 0.004 um off and more.
+  std::vector<std::vector<double>> x;
+  for (double step : {5.0, 10.0, 20.0}) {
+    Case scene = sheared_cell(step, 400, false);
+    for (int side : {2, 3}) scene.boundaries[side].ramp_us = 400;
+    x.push_back(run(scene).x);
+  }
+  const double fine = largest_difference(x[0], x[1]), coarse = largest_difference(x[1], x[2]);
+  INFO("positions change by " << fine << " and " << coarse << " um");
+  CHECK(coarse < 1e-3);
+  CHECK(fine < coarse);
+}
+
+TEST_CASE("where a membrane is in a periodic domain changes nothing but its place", "[coupling][force]") {
+  // Moved by whole cells: astride the sides of the block, and over its edge. Round-off, grown over the run.
+  Case scene = sheared_cell(10, 200, false);
+  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
+  const Run middle = run(scene);
+  for (const Triple& shift : {Triple{5, 0, 0}, Triple{4.5, 0, -5}}) {
+    scene.cells[0].center_um = shift;
+    const Run moved = run(scene);
+    Triple back = shift;
+    for (int m = 0; m < 3; ++m) back[m] -= moved.wrapped[m];
+    CHECK(largest_difference(middle.x, moved.x, back) < 1e-7);
+  }
+}
+
+TEST_CASE("steps too long for a membrane are refused, and the longest that is not is stable", "[coupling][force]") {
+  const bool slip = GENERATE(false, true);
+  Case scene = sheared_cell(1000, 4000, slip);
+  const std::string text = refusal(scene);
+  CHECK(text.find("time.step_us: steps of 1e+03 us are too long") != std::string::npos);
+  CHECK((text.find("coupling.slip = false") != std::string::npos) == slip);
+  const double longest = std::stod(text.substr(text.find("above about") + 12));
+  scene.time = {0.8 * longest, 0.8 * longest * 60};
+  const Run r = run(scene);
+  CHECK(r.cell.area_um2 == Approx(r.cell.rest_area_um2).epsilon(0.05));
+  CHECK(r.cell.stretch < 0.6);
+}
+
+TEST_CASE("the fastest relaxation is that of the stiffest of several laws", "[coupling][force]") {
+  using Law = CellSettings::Law;
+  const MobilityModel model{1.2, 0.4, 0.1};
+  const auto fastest = [&](const std::vector<Law>& laws) {
+    std::vector<CellSettings> cells;
+    for (Law law : laws) {
+      CellSettings cell;
+      cell.vertices = 300;
+      cell.law = law;
+      cell.shear_modulus_uN_per_m = law == Law::neo_hookean ? 20 : law == Law::skalak ? 10 : 5;
+      if (law != Law::wlc_pow) cell.area_modulus_uN_per_m = cell.local_area_modulus_uN_per_m = 0;
+      cell.center_um = {0, 0, 10.0 * static_cast<double>(cells.size())};
+      cells.push_back(cell);
+    }
+    Membranes membranes(cells);
+    update_surface_geometry(membranes.surfaces());
+    return membranes.fastest_relaxation_per_us(model);
+  };
+  const double springs = fastest({Law::wlc_pow}), skalak = fastest({Law::skalak}), neo_hookean = fastest({Law::neo_hookean});
+  CHECK(springs != Approx(skalak).epsilon(0.05));
+  // The same cells twice, and elsewhere: round-off of positions, in differences of forces over 1e-4 um.
+  CHECK(fastest({Law::skalak, Law::neo_hookean, Law::wlc_pow, Law::skalak}) ==
+        Approx(std::max({springs, skalak, neo_hookean})).epsilon(1e-6));
+}
+
+TEST_CASE("a cell beyond a wall is refused by name", "[coupling][force]") {
+  Case scene = sheared_cell(10, 100, false);
+  scene.cells[0].axis = {1, 0, 0};
+  scene.cells[0].center_um = {0, 2, 0};
+  const std::string text = refusal(scene);
+  INFO(text);
+  CHECK(text.find("cells.0") != std::string::npos);
+  CHECK(text.find("outside the grid") != std::string::npos);
+}
+
+#ifdef CORPUSCLE_MPI
+TEST_CASE("forces and velocities pass between ranks as they do within one", "[coupling][force][ranks]") {
+  if (Comm().size() == 1) return;
+  Case scene = sheared_cell(10, 300, true);
+  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
+  scene.cells[0].center_um = {4.8, 0.1, -4.7};  // over two sides and the planes between ranks
+  Timers timers;
+  FlowSimulation alone(Comm(MPI_COMM_SELF), scene, timers), shared(Comm(), scene, timers);
+  while (!alone.done()) alone.step(), shared.step();
+  const auto a = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), alone.surfaces()->x);
+  const auto b = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), shared.surfaces()->x);
+  double most = 0;
+  for (std::size_t i = 0; i < a.extent(0); ++i)
+    for (int m = 0; m < 3; ++m) most = std::max(most, std::abs(a(i, m) - b(i, m)));
+  CHECK(most < 1e-9);  // um: round-off, and the solvers' last residuals
+}
+#endif
