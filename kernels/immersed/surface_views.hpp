@@ -6,6 +6,8 @@
 
 namespace corpuscle {
 
+constexpr int no_vertex = 1 << 30;
+
 /// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank
 /// holds all surfaces.
 struct SurfaceSet {

@@ -383,10 +383,15 @@ NearBodies ImmersedBoundary::bodies_near(int node) const {
   const auto key = to_host(band_.key);
   const auto triangle_body = to_host(surface_.triangle_body);
   const auto body = [&](int c) { return key_body(triangle_body, key(c)); };
-  NearBodies near{load(x, node), body(node), -1};
-  for (int side = 0; side < 6 && near.other < 0; ++side) {
+  const auto kind = to_host(nodes_.kind);
+  const auto cut = to_host(band_.cut);
+  NearBodies near{load(x, node), body(node)};
+  for (int side = 0; side < 6; ++side) {
     const int other = node + (side % 2 == 0 ? 1 : -1) * grid_.index.stride(side / 2);
-    if (key(other) != no_key && body(other) != near.body) near.other = body(other);
+    if (key(other) == no_key) continue;
+    if (near.other < 0 && body(other) != near.body) near.other = body(other);
+    const bool between = cut(side % 2 == 0 ? node : other) & (1 << side / 2);
+    if (near.around < 0 && !between && kind(other) == NodeKind::inside) near.around = body(other);
   }
   return near;
 }

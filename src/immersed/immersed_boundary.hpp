@@ -52,6 +52,7 @@ struct ImmersedCounts {
 struct NearBodies {
   Vec3 at;                // um
   int body, other = -1;   // -1: no other
+  int around = -1;        // that a neighbour lies in with no triangle between; -1: none does
 };
 
 /// Owns the search band, the classification and the stencils of one rank's block. Communicates only through its options.
