@@ -52,9 +52,9 @@ void MultigridCycle<Field>::update() {
 template <class Field>
 int MultigridCycle<Field>::smooth_down(std::size_t number, int layers) {
   Level& level = levels_[number];
-  hierarchy_->levels()[number].halo.exchange(level.b);
   const int others = smoothing_.steps - 2;
   layers = std::max(0, std::min(layers, IndexSpace::halo - 1 - others));
+  hierarchy_->levels()[number].halo.exchange(level.b, std::max(layers + others + 1, smoothing_.steps - 1));
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   const auto first = steps.next(), second = steps.next();
   smooth_from_zero(level.views, first, second, layers + others, level.b, level.y, level.x);

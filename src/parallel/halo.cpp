@@ -41,6 +41,33 @@ CellBox slab(const IndexSpace& index, int d, int side, bool outside, int layers)
   return box;
 }
 
+/// Whether messages may start and end in the fields themselves.
+constexpr bool whole_planes_pass = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
+
+#ifdef CORPUSCLE_MPI
+/// Along the last direction layers are whole planes, each component's in one piece, which pass from field to field.
+template <class Field>
+void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neighbour)[2], const Field& field, int components,
+                     int layers) {
+  using Value = typename Field::non_const_value_type;
+  const int h = IndexSpace::halo, n = index.n[2], plane = index.stride(2), size = layers * plane;
+  const int bytes = size * static_cast<int>(sizeof(Value)), first = index.cell(-h, -h, 0);
+  const int sent[2] = {first, first + (n - layers) * plane}, filled[2] = {first - size, first + n * plane};
+  MPI_Request request[12];
+  int pending = 0;
+  Exec().fence();
+  for (int side = 0; side < 2; ++side)
+    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
+      MPI_Irecv(field.data() + static_cast<std::size_t>(m) * index.size() + filled[side], bytes, MPI_BYTE, neighbour[side],
+                2 * m + 1 - side, comm.handle(), &request[pending++]);
+  for (int side = 0; side < 2; ++side)
+    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
+      MPI_Isend(field.data() + static_cast<std::size_t>(m) * index.size() + sent[side], bytes, MPI_BYTE, neighbour[side],
+                2 * m + side, comm.handle(), &request[pending++]);
+  MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
+}
+#endif
+
 }  // namespace
 
 std::array<int, 3> ranks_per_direction(int ranks, const std::array<int, 3>& global) {
@@ -123,6 +150,10 @@ void Halo::run(const Field& field, int layers) {
       continue;
     }
 #ifdef CORPUSCLE_MPI
+    if (d == 2 && whole_planes_pass) {
+      exchange_planes(comm_, index_, neighbour_[2], field, components, layers);
+      continue;
+    }
     MPI_Request request[4];
     int pending = 0;
     for (int side = 0; side < 2; ++side) {
