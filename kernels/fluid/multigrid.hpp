@@ -67,22 +67,6 @@ struct MultigridLevel : LevelOperator<CycleReal> {
   bool shared[3][2] = {};     // sides whose halo is filled by others, or from the other end of a period
 };
 
-/// Run `body(i, j, k)` for every owned cell and for `layers` of the halo, two at most, beyond shared sides; lines are made up
-/// as by for_owned_rounded().
-template <class Body>
-void for_level(const std::string& label, const MultigridLevel& level, int layers, const Body& body) {
-  std::array<int, 3> lower, upper;
-  for (int d = 0; d < 3; ++d) {
-    lower[d] = level.shared[d][0] ? -layers : 0;
-    upper[d] = level.index.n[d] + (level.shared[d][1] ? layers : 0);
-  }
-#if !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
-  const int rounded = lower[0] + (upper[0] - lower[0] + 3) / 4 * 4, end = level.index.n[0] + IndexSpace::halo;
-  upper[0] = rounded < end ? rounded : end;
-#endif
-  for_box(label, lower, upper, body);
-}
-
 /// Conductances between nodes that both have a pressure, on owned cells and one halo layer.
 template <class Real>
 void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask& mask,
@@ -198,21 +182,19 @@ inline double sum_conductances(const MultigridLevel& level, int d) {
 }
 
 // The kernels of the cycle also run for halo cells behind each line (for_owned_rounded): beyond a physical side inverse is
-// zero, which leaves their x at zero; beyond another rank's side x is exchanged before it is read. Smoothing also does its
-// work for some layers of the halo, so that several steps follow one exchange.
+// zero, which leaves their x at zero; beyond another rank's side x is exchanged before it is read.
 
-/// previous, x = the first and the second Chebyshev iterate from zero, `layers` beyond shared sides too; b must be valid one
-/// layer further.
+/// previous, x = the first and the second Chebyshev iterate from zero.
 template <class Field>
 void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& first,
-                      const ChebyshevSteps::Step& second, int layers, const Field& b, const Field& previous, const Field& x) {
+                      const ChebyshevSteps::Step& second, const Field& b, const Field& previous, const Field& x) {
   const IndexSpace index = level.index;
   const double w0 = first.weight, w1 = second.weight, m1 = second.momentum;
   const CycleReal of_first = w0, of_others = w1 * w0, of_own = w0 + m1 * w0 + w1 - w1 * w0;
   const auto inverse = level.inverse;
   const auto g0 = level.conductance[0], g1 = level.conductance[1], g2 = level.conductance[2];
   const int s1 = index.stride(1), s2 = index.stride(2);
-  for_level(cycle_label<Field>("smooth_from_zero"), level, layers, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("smooth_from_zero"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const auto scaled = inverse(c) * value_at(b, c);
     const auto around = g0(c) * inverse(c - 1) * value_at(b, c - 1) + g0(c + 1) * inverse(c + 1) * value_at(b, c + 1) +
@@ -225,13 +207,12 @@ void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& f
 }
 
 /// previous = x + momentum (x - previous) + weight D^-1 (b - A x): the next iterate takes the place of the one before.
-/// The same `layers` beyond shared sides; x must be valid one layer further.
 template <class Field>
-void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, int layers, const Field& b, const Field& x,
+void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const Field& b, const Field& x,
             const Field& previous) {
   const IndexSpace index = level.index;
   const CycleReal momentum = step.momentum, weight = step.weight;
-  for_level(cycle_label<Field>("smooth"), level, layers, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("smooth"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const auto here = value_at(x, c);
     set_value(previous, c, here + momentum * (here - value_at(previous, c)) +
@@ -241,9 +222,9 @@ void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, int l
 
 /// residual = b - A x where there is an unknown, zero elsewhere.
 template <class Field>
-void level_residual(const MultigridLevel& level, int layers, const Field& b, const Field& x, const Field& residual) {
+void level_residual(const MultigridLevel& level, const Field& b, const Field& x, const Field& residual) {
   const IndexSpace index = level.index;
-  for_level(cycle_label<Field>("residual"), level, layers, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned_rounded(cycle_label<Field>("residual"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
     set_value(residual, c, unknown * (value_at(b, c) - level.apply(x, c)));

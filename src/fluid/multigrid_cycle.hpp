@@ -7,7 +7,7 @@
 
 namespace corpuscle {
 
-/// Chebyshev steps before and after a coarser level, 2 or 3 (one exchange of halos serves all of them), on this part of the spectrum of D^-1 A, which ends at 2.
+/// Chebyshev steps before and after a coarser level, at least 2, on this part of the spectrum of D^-1 A, which ends at 2.
 struct Smoothing {
   int steps;
   double from, to;
@@ -38,8 +38,8 @@ class MultigridCycle {
 
  private:
   void descend(std::size_t number, int depth);
-  int smooth_down(std::size_t number, int layers);
-  void smooth_up(std::size_t number, int layers);
+  void smooth_down(std::size_t number);
+  void smooth_up(std::size_t number);
 
   MultigridHierarchy* hierarchy_;
   Smoothing smoothing_;

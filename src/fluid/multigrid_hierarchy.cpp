@@ -108,7 +108,6 @@ void MultigridHierarchy::coarsen(std::size_t number) {
 void MultigridHierarchy::update(const PressureMask& mask) {
   Level& finest = levels_[0];
   mask_conductances(coefficient_, mask, finest.views);
-  for (auto& g : finest.views.conductance) finest.halo.exchange(g);
   for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
 }
 
