@@ -23,6 +23,10 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const
     Grid* grid = &fluid.grid();
     options.sum = [grid](long value) { return grid->comm().sum(value); };
     options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
+    options.exchange_band = [grid](const BandViews& band) {
+      grid->halo().exchange(band.key);
+      grid->halo().exchange(band.cut);
+    };
   }
   options.outflow = leaving.sides;
   if (fluid.boundaries().has_outflow()) options.pressure_given = fluid.boundaries().outflow();
