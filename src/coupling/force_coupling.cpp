@@ -25,6 +25,8 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
   const int vertices = membranes_->vertices();
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, vertices);
+  if (CellLoads::wanted(scene))
+    loads_ = std::make_unique<CellLoads>(scene_, fluid.grid().comm(), *membranes_, *transfer_, fluid.viscosity());
   fluid.set_face_force(transfer_->faces());
   fluid.raise_reference_speed(quiet_speed_);
   traction_ = Components<double>("corpuscle::coupling::traction", vertices, 3);
@@ -96,6 +98,7 @@ void ForceCoupling::check_start() {
         nearest_outflow(), outflow_limit_);
   }
   measure_stability();
+  if (loads_) loads_->look_at_start(lengths_us_.front());
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (!(longest <= stable_us_))
     throw InputError(
@@ -126,7 +129,7 @@ void ForceCoupling::measure_stability() {
   model.viscosity = fluid_.viscosity();
   model.radius = (three ? 0.91 : 1.25) * spacing;  // of a marker alone: Delong et al., J. Chem. Phys. 140, 2014
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
-  stable_us_ = limit / membranes_->fastest_relaxation_per_us(model);
+  stable_us_ = limit / std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
@@ -174,13 +177,18 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     const auto scope = timers_.scope("membrane");
     wrap();
     membranes_->set_out(second_order(dt) ? dt : 0);
+    if (loads_ && second_order(dt)) loads_->limit_approach();
     membranes_->compute_forces();
     update_surface_geometry(set);
   }
   {
     const auto scope = timers_.scope("transfer");
     place(time);
-    transfer_->spread(membranes_->views().force);
+    if (loads_) {
+      const auto contact = timers_.scope("contact");
+      loads_->gather(dt, second_order(dt));
+    }
+    transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
   {
@@ -189,16 +197,30 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     transfer_->interpolate(fluid_.flux(), fluid_.velocity(), scene_.coupling->slip ? &slip : nullptr, set.v);
     collect();
   }
-  const auto scope = timers_.scope("membrane");
-  membranes_->drift(dt, second_order(dt) ? 0.5 : 0);
+  {
+    const auto scope = timers_.scope("membrane");
+    membranes_->drift(dt, second_order(dt) ? 0.5 : 0);
+  }
+  if (loads_) after_move(time + dt, dt);
   StepStatistics statistics;
   statistics.coupling_iterations = 1;
   statistics.substeps = 1;
   return statistics;
 }
 
+void ForceCoupling::after_move(double time, double dt) {
+  const auto scope = timers_.scope("contact");
+  loads_->limit_approach();
+  wrap();
+  loads_->look(time, dt);
+}
+
+void ForceCoupling::resume(double time) {
+  if (loads_) loads_->look(time, lengths_us_.front());
+}
+
 SlipViews ForceCoupling::slip_of_membranes() const {
-  return transfer_->slip(surfaces(), membranes_->views().force, fluid_.viscosity(), slip_share_);
+  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), loads_ ? loads_->gaps() : Array<double>());
 }
 
 double ForceCoupling::unresolved_dissipation() {
@@ -207,7 +229,7 @@ double ForceCoupling::unresolved_dissipation() {
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
-  force_per_area(membranes_->vertices(), membranes_->views().force, surfaces().area, -1, traction_);
+  force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);
   return traction_;
 }
 

@@ -1,6 +1,7 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere, and move with it.
 #pragma once
 
+#include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
 #include "immersed/wrap.hpp"
 #include "transfer/near_side.hpp"
@@ -25,10 +26,17 @@ class ForceCoupling : public Coupling {
   std::map<std::string, double> report(double dt_us) const override;
   double power_on_cells() override;
   double unresolved_dissipation() override;
+  double power_of_pushes() override { return loads_ ? loads_->power_of_pushes() : 0; }
+  double contact_energy(double dt_us) override { return loads_ ? loads_->contact_energy(dt_us) : 0; }
+  std::optional<ContactReport> contact_report() const override { return loads_ ? loads_->report() : std::nullopt; }
+  void resume_contact(const ContactReport& report) override {
+    if (loads_) loads_->resume(report);
+  }
 
   /// Periods taken off each cell since the start.
   std::vector<double> state() const override;
   void set_state(const std::vector<double>& state) override;
+  void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
   const SurfaceSet& surfaces() const override { return membranes_->surfaces(); }
   Membranes* membranes() override { return membranes_.get(); }
@@ -39,7 +47,10 @@ class ForceCoupling : public Coupling {
   void collect();
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
+  /// The sum of all forces at the last gathering of loads.
+  const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;
+  void after_move(double time_us, double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
 
@@ -50,7 +61,7 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Membranes> membranes_;
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa
-  Array<double> slip_share_;                    // [vertex] empty: 1
+  std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   HostCopy<Components<double>> velocity_host_;  // only on several ranks
   PeriodicFrame frame_;
   double quiet_speed_;        // um/us: what counts as rest

@@ -91,7 +91,7 @@ void ImmersedFlow::check_positions(double smallest_gap) {
         "gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
         "them.{} Move or tilt the cell (center_um, axis), refine the grid (grid.nodes) or use a {}",
         wall ? "the wall" : "a side", boundary_->describe_vertex(vertex), to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)),
-        smallest_gap, wall ? "film" : "flow", wall ? " Contact forces do not exist yet." : "", wall ? "wider channel" : "larger grid"));
+        smallest_gap, wall ? "film" : "flow", wall ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "", wall ? "wider channel" : "larger grid"));
   }
   check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
 }
@@ -112,11 +112,11 @@ void ImmersedFlow::check_clearance(int crossed, double between, double smallest_
     if (alone)
       throw ComputationError(fmt::format(
           "surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "
-          "or a step too long (time.step_us): contact forces do not exist yet",
+          "or a step too long (time.step_us)",
           inside, where));
     throw ComputationError(fmt::format(
-        "surfaces cross: {} and {} overlap near {}. Contact forces do not exist yet: move them apart (center_um, axis) or "
-        "end the run before they meet (time.end_us)",
+        "surfaces cross: {} and {} overlap near {}. Contact forces are only between membranes that are forces (coupling.scheme = "
+        "\"force\", [contact]): move them apart (center_um, axis) or end the run before they meet (time.end_us)",
         first, second, where));
   }
   if (between < smallest_gap) {
@@ -124,8 +124,8 @@ void ImmersedFlow::check_clearance(int crossed, double between, double smallest_
     const auto [where, first, second, inside] = describe_bodies(here ? counts.gap_node : -1);
     throw ComputationError(fmt::format(
         "gap between bodies: {} and {} are {:.2f} grid spacings apart, or overlap, near {}, and {:.2f} are needed to resolve the film "
-        "between them. Contact forces do not exist yet: move them apart (center_um, axis), refine the grid (grid.nodes) or "
-        "end the run before they meet (time.end_us)",
+        "between them. Contact forces are only between membranes that are forces (coupling.scheme = \"force\", [contact]): move them "
+        "apart (center_um, axis), refine the grid (grid.nodes) or end the run before they meet (time.end_us)",
         first, second.empty() ? "its image beyond a periodic boundary" : second, between, where, smallest_gap));
   }
 }

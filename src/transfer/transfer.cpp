@@ -35,7 +35,8 @@ PeriodImages period_images(const Grid& grid) {
 }
 
 /// Bounds of the lattice in space, widened by one of its links.
-void find_bounds(const Lattice& lattice, MarkerSearch& search) {
+/// @returns the longest link
+double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lattice.x);
   double link = 0;
   search.lower = {1e300, 1e300, 1e300};
@@ -53,6 +54,7 @@ void find_bounds(const Lattice& lattice, MarkerSearch& search) {
       }
   search.lower -= {link, link, link};
   search.upper += {link, link, link};
+  return link;
 }
 
 void set_reflections(const std::vector<BoundarySettings>& boundaries, TransferBlock& block) {
@@ -87,7 +89,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   set_reflections(boundaries, block_);
   search_.lattice = block_.lattice;
   search_.images = period_images(grid);
-  find_bounds(block_.lattice, search_);
+  largest_spacing_ = find_bounds(block_.lattice, search_);
   with_kernel([&](auto delta) { search_.reach = decltype(delta)::reach; });
   places_ = {make<Table<double>>("vertex_xi", vertices, 3), make<Array<int>>("vertex_image", vertices),
              make<Array<unsigned>>("vertex_reach", vertices), make<Array<int>>("vertex_first", vertices + 1),
@@ -143,10 +145,10 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
 }
 
 SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                         const Array<double>& chi) const {
+                         const Array<double>& gap) const {
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
-  return {law, viscosity, force, surface.normal, surface.area, chi};
+  return {law, viscosity, force, surface.normal, surface.area, gap};
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }
