@@ -232,7 +232,8 @@ double Contact::fastest_relaxation_per_us() const {
 }
 
 void Contact::add_forces(double dt, bool ahead, const Components<double>& force) {
-  if (ahead && ahead_.item.extent(0) < now_.item.extent(0)) ahead_ = make_contacts(&now_);
+  const bool made = ahead_.hit_start.data() && ahead_.item.extent(0) >= now_.item.extent(0);
+  if (ahead && !made) ahead_ = make_contacts(&now_);
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
   contact_forces(surface_, law(dt), rest_, lists_, contacts);
