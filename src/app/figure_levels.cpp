@@ -85,14 +85,13 @@ constexpr FigureLevel levels[] = {
     {"rest_residual", 0.1, false, Of::itself, "stretching.tolerance", "the cell had not come to rest: lower stretching.tolerance"},
 };
 
-constexpr double slowest = 1e-9;        // um/us: what counts as rest
 constexpr double thermal_noise = 4e-4;  // fJ, a hundred times k T: less work than that moves nothing
 
 bool applies(Of of, const FigureScales& scales) {
   switch (of) {
     case Of::flow: return !scales.stretching;
     case Of::stretching: return scales.stretching;
-    case Of::speed: return !(scales.speed_um_per_us <= slowest);
+    case Of::speed: return !(scales.speed_um_per_us <= speed_at_rest);
     case Of::energy: return !(scales.energy_fJ <= thermal_noise);
     case Of::left_out_convection: return scales.convection_left_out;
     default: return true;

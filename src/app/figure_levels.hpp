@@ -5,6 +5,9 @@
 
 namespace corpuscle {
 
+/// What counts as rest, um/us: shares of a speed are of this one at least.
+constexpr double speed_at_rest = 1e-9;
+
 /// What some figures are shares of. Where that is next to nothing, they say nothing.
 struct FigureScales {
   double speed_um_per_us = 0;  // the largest so far

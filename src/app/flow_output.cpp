@@ -340,7 +340,7 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   errors["splitting_max"] = now.splitting_max;
   if (simulation_.immersed()) {
     // Of the flow's own speed, prescribed or computed: the solvers' reference may be that of a membrane's return to its shape.
-    errors["slip"] = now.slip_speed / std::max({simulation_.fluid().boundaries().largest_speed(), now.speed, 1e-30});
+    errors["slip"] = now.slip_speed / std::max({simulation_.fluid().boundaries().largest_speed(), now.speed, speed_at_rest});
     const auto& search = now.immersed;
     report.extra["immersed"] = {{"classifications", search.classifications},
                                 {"immersed_nodes", search.immersed},

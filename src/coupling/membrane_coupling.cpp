@@ -211,7 +211,7 @@ StepStatistics StaggeredCoupling::advance(double time, double dt) {
   statistics.substeps = membranes_->advance(dt, stress, beta_, v_interface_);
   const auto norms = interface_residual(n, surfaces_->v, v_interface_, previous_residual_, residual_);
   statistics.coupling_iterations = 1;
-  statistics.coupling_residual = norms.answer > 0 ? std::sqrt(norms.residual / norms.answer) : 0;
+  statistics.coupling_residual = std::sqrt(norms.residual / std::max(norms.answer, n * quiet_speed_ * quiet_speed_));
   watch_growth(statistics.coupling_residual, norms.answer);
   return statistics;
 }

@@ -25,7 +25,8 @@ MultigridHierarchy::MultigridHierarchy(Grid& grid, const Array<double> (&coeffic
   for (int d = 0; d < 3; ++d) coefficient_[d] = coefficient[d];
   build(coefficient, gathered_cells);
   // A level that hypre solves is one for all ranks together, which end alike when that fails.
-  if (levels_.back().views.index.owned() > most_direct && levels_.back().comm.size() < grid.comm().size()) build(coefficient, 0);
+  const bool alone = levels_.back().views.index.owned() > most_direct && levels_.back().comm.size() < grid.comm().size();
+  if (grid.comm().max(alone) > 0) build(coefficient, 0);
 }
 
 void MultigridHierarchy::build(const Array<double> (&coefficient)[3], int most_gathered) {

@@ -130,6 +130,14 @@ TEST_CASE("a cell is at the outflow when it is, whatever the speed that shear mo
   fail(folder, coarse_tube("out", {"time.end_us=40", "time.stop_before_outflow_um=21.2"}), 5, {"the limit is", "time.stop_before_outflow_um"});
 }
 
+TEST_CASE("figures of a flow at rest are not shares of round-off") {
+  const auto folder = fresh_folder("still");
+  succeed(folder, coarse_tube("out", {"time.end_us=3", "boundary.0.velocity_mm_per_s=0"}));
+  const auto still = report(folder / "out");
+  CHECK(still["errors"]["slip"] < 1e-3);  // of what counts as rest
+  CHECK(still["errors"]["coupling_residual"] < 1e-3);
+}
+
 TEST_CASE("cells too near to an inlet or a symmetry side are refused at the start") {
   const auto folder = fresh_folder("near_sides");
   const auto tube = [&](const char* center) {
