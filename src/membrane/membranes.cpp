@@ -50,8 +50,7 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
     tangential |= types[type].law.tangential_damping > 0;
   }
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
-  views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
-  views_.surface.cells = views_.cells;
+  views_ = make_membrane_views(make_surface_set(bodies, int(cells.size())), types, type_of_cell);
   elasticity_ = make_elasticity(types, type_of_cell);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
