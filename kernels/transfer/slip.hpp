@@ -62,14 +62,17 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const Lattice& lattice, const SlipView
   return share * slip_motion(slip.law, along, n, f - dot(f, n) * n);
 }
 
-/// Adds the slip to the velocity of markers that are at home.
-inline void add_slip(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers) {
+/// Adds the slip to the velocity [vertex, 3] of vertices whose marker is at home.
+inline void add_slip(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers,
+                     const Components<double>& velocity) {
   const Lattice lattice = block.lattice;
+  const auto of_vertex = velocity;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   Kokkos::parallel_for(
       "corpuscle::transfer::add_slip", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        if (m.home(marker)) store(m.velocity, marker, load(m.velocity, marker) + slip_velocity(lattice, s, m, marker));
+        const int v = m.vertex(marker);
+        if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(lattice, s, m, marker));
       });
 }
 

@@ -170,13 +170,14 @@ KOKKOS_INLINE_FUNCTION double given_flux(const TransferBlock& block, const Compo
   return flux;
 }
 
-/// velocity of every marker: the part that the faces of this rank give.
+/// velocity [vertex, 3], um/us, of the markers' vertices: the part that the faces of this rank give.
 /// @param u  [cell, 3] um/us, read on the sides of the block
 template <class Delta>
 void interpolate_velocity(const TransferBlock& transfer_block, const Array<double> (&flux)[3], const Components<double>& u,
-                          const MarkerViews& markers) {
+                          const MarkerViews& markers, const Components<double>& velocity) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
+  const auto of_vertex = velocity;
   const FaceForce through{{flux[0], flux[1], flux[2]}};
   Kokkos::parallel_for(
       "corpuscle::transfer::interpolate_velocity", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
@@ -187,7 +188,7 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
         for (int e = 0; e < 3; ++e)
           folded = folded || (block.lattice.boundary_below[e] && eta[e] < Delta::reach) ||
                    (block.lattice.boundary_above[e] && eta[e] > index.n[e] - 1 - Delta::reach);
-        Vec3 velocity;
+        Vec3 part;
         for (int d = 0; d < 3; ++d) {
           double sum = 0;
           for (int c = 0; c < points; ++c) {
@@ -212,20 +213,9 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
                 return;
               sum += w * given_flux(block, u, d, row, end, load(block.area[d], c));
             });
-          velocity += sum * inverse_column(m, marker, d);
+          part += sum * inverse_column(m, marker, d);
         }
-        store(m.velocity, marker, velocity);
-      });
-}
-
-/// v [vertex, 3] = the sum over each vertex's markers, in their order.
-inline void collect_velocity(const Array<int>& first, const MarkerViews& markers, const Components<double>& v) {
-  const MarkerViews m = markers;
-  Kokkos::parallel_for(
-      "corpuscle::transfer::collect_velocity", Policy(0, static_cast<int>(first.extent(0)) - 1), KOKKOS_LAMBDA(int i) {
-        Vec3 sum;
-        for (int marker = first(i); marker < first(i + 1); ++marker) sum += load(m.velocity, marker);
-        store(v, i, sum);
+        store(of_vertex, m.vertex(marker), part);
       });
 }
 

@@ -1,8 +1,8 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere, and move with it.
 #pragma once
 
+#include "cells/shared_cells.hpp"
 #include "coupling/coupling.hpp"
-#include "immersed/wrap.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -26,17 +26,20 @@ class ForceCoupling : public Coupling {
   double power_on_cells() override;
   double unresolved_dissipation() override;
 
-  /// Periods taken off each cell since the start.
-  std::vector<double> state() const override;
-  void set_state(const std::vector<double>& state) override;
+  void cells_restored() override;
   std::vector<Triple> wrapped_by() const override;
-  const SurfaceSet& surfaces() const override { return membranes_->surfaces(); }
-  Membranes* membranes() override { return membranes_.get(); }
+  const SurfaceSet& surfaces() const override { return cells_->surfaces(); }
+  Membranes* membranes() override { return membranes_; }
+  SharedCells* shared_cells() override { return cells_.get(); }
+  int cells() override { return cells_->total(); }
+  long vertices() override { return cells_->total_vertices(); }
 
  private:
   void place(double time_us);
-  void wrap();
-  void collect();
+  void take_up();
+  void watch_outflow();
+  template <class Work>
+  void together(const Work& work) const;
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
   SlipViews slip_of_membranes() const;
@@ -47,14 +50,12 @@ class ForceCoupling : public Coupling {
   FluidSolver& fluid_;
   Timers& timers_;
   std::vector<double> lengths_us_;  // of all steps there will be
-  std::unique_ptr<Membranes> membranes_;
+  std::unique_ptr<SharedCells> cells_;
+  Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
-  Components<double> traction_;                 // [vertex, 3] kPa
+  Components<double> traction_;                 // [vertex, 3] kPa; made when it is asked for
   Array<double> slip_share_;                    // [vertex] empty: 1
-  HostCopy<Components<double>> velocity_host_;  // only on several ranks
-  PeriodicFrame frame_;
   double quiet_speed_;        // um/us: what counts as rest
-  Table<int> laps_;           // [cell, 3] only in periodic domains
   std::string coarse_;        // which cells the grid resolves coarsely
   double stable_us_ = 0;      // largest stable step at the start
   double outflow_limit_ = 0;  // um

@@ -15,6 +15,8 @@ class Transfer {
   /// @param vertices    how many place() is called with
   Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices);
 
+  /// The vertices are others from now on.
+  void take_up(const SurfaceSet& set);
   /// Find the vertices' positions x [vertex, 3], um, in the grid. Must precede the calls below.
   /// @returns the lowest vertex that is outside the grid on this rank, or -1
   int place(const Components<double>& x);
@@ -31,13 +33,14 @@ class Transfer {
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
                  const Array<double>& chi = {}) const;
 
-  /// Vertices that lie in this rank's own cells, after place(). Over all ranks all of them do.
+  /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
   int markers() const { return markers_.count; }
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
 
  private:
+  void make_places(int vertices);
   void make_room(int markers);
   template <class Use>
   void with_kernel(const Use& use) const;
