@@ -7,7 +7,7 @@
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 290 bytes.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 210 bytes.
 struct MarkerViews {
   int count = 0;
   Array<int> vertex;            // [marker] where it comes from
@@ -15,7 +15,6 @@ struct MarkerViews {
   Table<double> eta;            // [marker, 3] position in index space: cells of this rank at 0, 1, ...; walls half a cell away
   Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
   Table<double> weight;         // [marker, 6 points] of those lines of points
-  Table<double> inverse;        // [marker, 9] of the matrix of face areas that it sees, 1/um2
   Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers

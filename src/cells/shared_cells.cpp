@@ -33,7 +33,8 @@ Box box_of(const HostMirror<Table<double>>& boxes, int cell, double margin) {
 
 }  // namespace
 
-SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um)
+SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
+                         std::shared_ptr<Workspace> workspace)
     : comm_(grid.comm()),
       blocks_(grid, layers),
       shifts_(period_shifts(grid)),
@@ -41,7 +42,7 @@ SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& gri
       skin_(grid.mean_spacing()),
       contact_(contact_um) {
   const CellTypes types = find_cell_types(cells);
-  membranes_ = std::make_unique<Membranes>(types.references);
+  membranes_ = std::make_unique<Membranes>(types.references, std::move(workspace));
   start(cells, types);
 }
 

@@ -27,7 +27,8 @@ class SharedCells {
   /// @param layers      cells around a rank's own in which it must know of surfaces
   /// @param contact_um  within which surfaces must know of each other wherever their ranks are
   /// @throws InputError  as Membranes
-  SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um);
+  SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
+              std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
   Membranes& membranes() { return *membranes_; }
   const Membranes& membranes() const { return *membranes_; }

@@ -35,10 +35,12 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       fluid_(fluid),
       timers_(timers),
       lengths_us_(schedule.lengths_us()),
-      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, 0.0)),
+      workspace_(std::make_shared<Workspace>()),
+      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, 0.0, workspace_)),
       membranes_(&cells_->membranes()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
-  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices);
+  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
+                                         workspace_);
   fluid.set_face_force(transfer_->faces());
   fluid.raise_reference_speed(quiet_speed_);
   take_up();
@@ -239,8 +241,8 @@ double ForceCoupling::unresolved_dissipation() {
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
-  if (!traction_.data() || traction_.extent(0) < static_cast<std::size_t>(membranes_->vertices()))
-    traction_ = Components<double>("corpuscle::coupling::traction", surfaces().x.extent(0), 3);
+  const std::size_t vertices = membranes_->vertices();
+  traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);
   force_per_area(membranes_->vertices(), membranes_->views().force, surfaces().area, -1, traction_);
   return traction_;
 }

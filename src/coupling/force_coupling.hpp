@@ -50,10 +50,11 @@ class ForceCoupling : public Coupling {
   FluidSolver& fluid_;
   Timers& timers_;
   std::vector<double> lengths_us_;  // of all steps there will be
+  std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
   Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
-  Components<double> traction_;                 // [vertex, 3] kPa; made when it is asked for
+  Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
   Array<double> slip_share_;                    // [vertex] empty: 1
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely

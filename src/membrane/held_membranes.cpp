@@ -10,8 +10,8 @@ namespace corpuscle {
 
 namespace {
 
-/// A tenth to spare, so that arrays are seldom too small.
-std::size_t roomy(std::size_t count) { return count + count / 10 + 1; }
+/// Some to spare, so that arrays are seldom too small.
+std::size_t roomy(std::size_t count) { return count + count / 16 + 1; }
 
 template <class View>
 bool has_room(const View& view, std::size_t rows) {
@@ -45,7 +45,8 @@ void fill(const Array<int>& view, const std::vector<int>& values) {
 
 }  // namespace
 
-Membranes::Membranes(const std::vector<CellReference>& types) : types_(types) {
+Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)
+    : types_(types), workspace_(std::move(workspace)) {
   std::vector<TriangleMesh> meshes;
   for (const CellReference& type : types_) meshes.push_back(type.mesh);
   templates_ = make_surface_set(meshes);
@@ -89,12 +90,19 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(views_.type, "type_body", needed.bodies);
   grow(views_.triangle_geometry, "triangle_geometry", views_.triangles, 4);
   grow(views_.totals, "totals_section", std::size_t(views_.cells) * sections, 2);
-  grow(views_.corner_force, "corner_force", views_.triangles, 9);
   grow(views_.force, "force_vertex", needed.vertices, 3);
-  grow(motion_.direction, "direction_vertex", views_.vertices, 3);
   grow(motion_.sums, "motion_sums_section", std::size_t(views_.cells) * sections, 2);
   grow(start_x_, "start_x_vertex", views_.vertices, 3);
   grow(start_v_, "start_v_vertex", views_.vertices, 3);
+}
+
+/// What is only of use within a call lies where others have such things in between.
+void Membranes::take_workspace() {
+  if (!workspace_) return;
+  const std::size_t triangles = views_.triangles, vertices = views_.vertices;
+  double* memory = workspace_->reserve(9 * triangles + 3 * vertices);
+  views_.corner_force = Table<double>(memory, triangles, 9);
+  motion_.direction = Components<double>(memory + 9 * triangles, vertices, 3);
 }
 
 void Membranes::hold(const std::vector<HeldCell>& cells, int own) {

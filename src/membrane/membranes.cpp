@@ -69,6 +69,7 @@ Membranes::~Membranes() = default;
 
 void Membranes::estimate_stiffness() {
   if (views_.cells == 0) return;
+  take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
   largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue);
@@ -112,6 +113,7 @@ int Membranes::substeps(double dt_us, double beta) const {
 
 void Membranes::compute_forces() {
   if (views_.cells == 0) return;
+  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   elasticity_->membrane_forces(views_, views_.surface.x, views_.force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
@@ -181,6 +183,7 @@ void Membranes::set_out(double ahead_us) {
 
 void Membranes::drift(double dt, double share) {
   if (views_.cells == 0) return;
+  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   measure_drift(views_, motion_);
   project_and_drift(views_, motion_, start_x_, start_v_, share, dt);
@@ -204,6 +207,7 @@ double Membranes::fastest_relaxation_per_us(const MobilityModel& model) {
 /// Power iteration on mobility times stiffness, for some of the cells.
 double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells) {
   constexpr double distance = 1e-4;  // um, as for the stiffness
+  take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   start_mode(views_, work);

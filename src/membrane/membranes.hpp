@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/workspace.hpp"
 #include "immersed/surface.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/membrane_views.hpp"
@@ -50,8 +51,8 @@ class Membranes {
   /// Build the cells' meshes and references, and one surface set that holds the cells first and then `rigid_bodies`.
   /// @throws InputError  for settings out of range or meshes that are not closed
   explicit Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies = {});
-  /// None yet: hold() says which.
-  explicit Membranes(const std::vector<CellReference>& types);
+  /// None yet: hold() says which. @param workspace  shared with others that do not use it in the calls below
+  Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace);
   ~Membranes();
   Membranes(const Membranes&) = delete;
   Membranes& operator=(const Membranes&) = delete;
@@ -152,6 +153,7 @@ class Membranes {
 
   void describe_cells(const std::vector<HeldCell>& cells, int own);
   void make_room(const SurfaceSet& needed);
+  void take_workspace();
   void estimate_stiffness();
   void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                      const Components<double>& v_star);
@@ -167,6 +169,7 @@ class Membranes {
   HostCopy<Array<int>> status_host_;
   std::vector<CellReference> types_;
   SurfaceSet templates_;                         // one body for each type; only with hold()
+  std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
   std::vector<int> number_;                      // [cell] in the whole scene
   std::vector<bool> holds_area_;                 // [cell]
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance

@@ -56,8 +56,9 @@ void Transfer::with_kernel(const Use& use) const {
     use(ThreePointDelta());
 }
 
-Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices)
-    : grid_(&grid), kernel_(kernel) {
+Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
+                   std::shared_ptr<Workspace> workspace)
+    : grid_(&grid), kernel_(kernel), workspace_(std::move(workspace)) {
   const GridViews& views = grid.views();
   const int cells = views.index.size();
   block_.lattice = make_lattice(views);
@@ -80,7 +81,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
 void Transfer::make_places(int vertices) {
   places_.vertices = vertices;
   if (!places_.known.data() || places_.known.extent(0) < static_cast<std::size_t>(vertices)) {
-    const int room = vertices + vertices / 10 + 1;
+    const int room = vertices + vertices / 16 + 1;
     places_.xi = Table<double>();
     places_.xi = make<Table<double>>("vertex_xi", room, 3);
     places_.known = make<Array<unsigned char>>("vertex_known", room);
@@ -95,27 +96,28 @@ void Transfer::take_up(const SurfaceSet& set) {
 }
 
 void Transfer::make_room(int markers) {
-  if (markers <= room_) return;
-  room_ = markers + markers / 10 + 1;
+  if (markers > room_) {
+    room_ = markers + markers / 16 + 1;
+    markers_.vertex = make<Array<int>>("marker_vertex", room_);
+    markers_.home = make<Array<unsigned char>>("marker_home", room_);
+    markers_.eta = make<Table<double>>("marker_eta", room_, 3);
+    markers_.base = make<Table<short>>("marker_base", room_, 6);
+    markers_.order = make<Array<int>>("marker_order", room_);
+  }
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
-  markers_.vertex = make<Array<int>>("marker_vertex", room_);
-  markers_.home = make<Array<unsigned char>>("marker_home", room_);
-  markers_.eta = make<Table<double>>("marker_eta", room_, 3);
-  markers_.base = make<Table<short>>("marker_base", room_, 6);
-  markers_.weight = make<Table<double>>("marker_weight", room_, 6 * points);
-  markers_.inverse = make<Table<double>>("marker_inverse", room_, 9);
-  markers_.across = make<Table<double>>("marker_across", room_, 3);
-  markers_.order = make<Array<int>>("marker_order", room_);
+  const auto rows = static_cast<std::size_t>(room_);
+  double* memory = workspace_->reserve((6 * points + 3) * rows);
+  markers_.weight = Table<double>(memory, rows, 6 * points);
+  markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
 }
 
 int Transfer::place(const Components<double>& x) {
   find_vertices(search_, x, places_);
   markers_.count = number_markers(places_, markers_, room_);
-  if (markers_.count > room_) {
-    make_room(markers_.count);
-    number_markers(places_, markers_, room_);
-  }
+  const bool again = markers_.count > room_;
+  make_room(markers_.count);
+  if (again) number_markers(places_, markers_, room_);
   fill_markers(search_, places_, markers_);
   sort_markers(block_.index(), markers_);
   with_kernel([&](auto delta) {
@@ -127,8 +129,10 @@ int Transfer::place(const Components<double>& x) {
 }
 
 void Transfer::spread(const Components<double>& force) {
-  resolve_forces(markers_, force);
-  with_kernel([&](auto delta) { spread_forces<decltype(delta)>(block_, markers_, faces_); });
+  with_kernel([&](auto delta) {
+    resolve_forces<decltype(delta)>(block_, markers_, force);
+    spread_forces<decltype(delta)>(block_, markers_, faces_);
+  });
   for (const auto& across : faces_.across) grid_->halo().exchange(across);
 }
 

@@ -1,6 +1,9 @@
 // Forces from vertices to the grid's faces and velocities back, with one kernel and its transpose.
 #pragma once
 
+#include <memory>
+
+#include "core/workspace.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
 #include "immersed/surface_views.hpp"
@@ -13,7 +16,9 @@ class Transfer {
  public:
   /// @param boundaries  one entry per side
   /// @param vertices    how many place() is called with
-  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices);
+  /// @param workspace   shared with others that do not use it between place() and interpolate()
+  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
+           std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
   /// The vertices are others from now on.
   void take_up(const SurfaceSet& set);
@@ -52,6 +57,7 @@ class Transfer {
   VertexPlaces places_;
   HostCopy<Array<int>> beyond_host_;
   MarkerViews markers_;
+  std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
   FaceForce faces_;
 };
