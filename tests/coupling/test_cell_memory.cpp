@@ -23,6 +23,13 @@ double held_mb() {
   return static_cast<double>(info.uordblks + info.hblkhd) / mb;
 }
 
+/// Not what a device or a sanitizer allocates.
+bool counted() {
+  const bool yes = std::is_same_v<Memory, Kokkos::HostSpace> && held_mb() > 0;
+  if (!yes) WARN("skipped: memory is not on this process's heap");
+  return yes;
+}
+
 /// A channel along z, periodic there, with a place for a red cell of 500 vertices every 6 um; spacing 1 um.
 /// @param cells  at which places
 Case channel(int places, const std::vector<int>& cells) {
@@ -75,6 +82,7 @@ Held held_by(const Case& scene) {
 }  // namespace
 
 TEST_CASE("memory grows with a rank's own cells alone", "[coupling][cells][memory][ranks]") {
+  if (!counted()) return;
   const int places = 64;
   Case empty = channel(places, {});
   empty.coupling.reset();
@@ -84,23 +92,26 @@ TEST_CASE("memory grows with a rank's own cells alone", "[coupling][cells][memor
   std::vector<double> cells, own_mb;
   for (int count : {4, 16, 64}) {
     const Held held = held_by(channel(places, every_place(count)));
-    cells.push_back(comm.sum(static_cast<double>(held.own)));
+    CHECK(comm.sum(static_cast<double>(held.own)) == count);
+    cells.push_back(comm.sum(static_cast<double>(held.own + held.copies)));
     own_mb.push_back(comm.sum(held.mb - grid));
     if (std::getenv("CORPUSCLE_SHOW"))
       WARN(fmt::format("rank {} of {}: {} cells, {} copies: {:.3f} MB beside the grid's {:.3f}", comm.rank(), comm.size(),
                        held.own, held.copies, held.mb - grid, grid));
-    CHECK(cells.back() == count);
-    // A rank's share, and what does not grow.
-    CHECK(held.mb - grid < 0.3 * (held.own + held.copies) + 20);
+    // A rank's share, and what does not grow with it: copies are of a block's surface.
+    CHECK(held.mb - grid < 0.3 * held.own + 20);
   }
-  const double slope = (own_mb[2] - own_mb[1]) / 48, first_slope = (own_mb[1] - own_mb[0]) / 12;
+  // A copy takes less than a cell.
+  const double first_slope = (own_mb[1] - own_mb[0]) / (cells[1] - cells[0]);
+  const double slope = (own_mb[2] - own_mb[1]) / (cells[2] - cells[1]);
   INFO(first_slope << " and " << slope << " MB a cell");
   CHECK(slope < 0.3);
+  CHECK(slope == Approx(first_slope).epsilon(0.1));  // linear, up to the room that arrays have to spare
 }
 
 TEST_CASE("a rank does not see how many cells others have", "[coupling][cells][memory][ranks]") {
   const Comm comm;
-  if (comm.size() == 1) return;
+  if (comm.size() == 1 || !counted()) return;
   const int places = 64, block = places / comm.size();
   // The first rank has four in the middle of its block, the others as many or three times as many.
   const auto held_with = [&](int others) {
