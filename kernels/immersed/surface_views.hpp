@@ -6,6 +6,8 @@
 
 namespace corpuscle {
 
+constexpr int no_vertex = 1 << 30;
+
 /// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank holds all
 /// surfaces, or those that reach into its block (SharedCells): then copies of other ranks' cells, and of its own where a
 /// periodic side brings them back, follow its own cells, shifted to where this block sees them. Arrays may have room for more

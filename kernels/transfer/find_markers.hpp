@@ -20,7 +20,6 @@ struct VertexPlaces {
   Array<unsigned char> reach;   // [vertex] 1 if it reaches this rank's faces
   Array<int> beyond;            // [1] lowest vertex found beyond a side
 };
-constexpr int no_vertex = 1 << 30;
 
 /// Index coordinates in which walls are half a cell away from the first cell.
 KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const LatticePoint& q, double (&eta)[3]) {

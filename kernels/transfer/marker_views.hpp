@@ -4,6 +4,7 @@
 #pragma once
 
 #include "immersed/lattice.hpp"
+#include "immersed/surface_views.hpp"
 
 namespace corpuscle {
 

@@ -45,11 +45,37 @@ struct SlipViews {
   Components<double> force;  // [vertex, 3] nN, of the membrane on the fluid
   Components<double> normal;
   Array<double> area;  // [vertex] um2
-  Array<double> chi;   // [vertex] from 1 for a membrane alone to 0 where others are near; without values: 1
+  Array<double> gap;   // [vertex] um to the nearest other surface; without values nothing is near
 };
 
+/// How much of the slip is left at a gap of so many spacings: all above 1.5, none below 0.5. A velocity that belongs to one
+/// membrane would let two of them cross; one that all take from the same field cannot, since it is continuous.
+KOKKOS_INLINE_FUNCTION double slip_share(double spacings) {
+  const double t = spacings - 0.5;
+  return t <= 0 ? 0 : (t >= 1 ? 1 : t * t * (3 - 2 * t));
+}
+constexpr double slip_reach = 1.5;  // spacings
+
+/// How much is left beside a side that gives the velocity along itself. There the kernel is folded back, and a force along a
+/// plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side itself
+/// (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
+KOKKOS_INLINE_FUNCTION double slip_share_at_sides(const TransferBlock& block, const double (&eta)[3]) {
+  constexpr double whole = 0.6;  // spacings
+  double share = 1;
+  for (int d = 0; d < 3; ++d) {
+    const double below = eta[d] + 0.5, above = block.index().n[d] - 0.5 - eta[d];
+    double gap = whole;
+    if (block.lattice.boundary_below[d] && block.reflection[d][0][0] < 0 && below < gap) gap = below;
+    if (block.lattice.boundary_above[d] && block.reflection[d][1][0] < 0 && above < gap) gap = above;
+    const double left = gap > 0 ? 1 - gap / whole : 1;
+    share *= 1 - left * left;
+  }
+  return share;
+}
+
 /// Of a marker's vertex, um/us.
-KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const Lattice& lattice, const SlipViews& slip, const MarkerViews& m, int marker) {
+KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const SlipViews& slip, const MarkerViews& m, int marker) {
+  const Lattice& lattice = block.lattice;
   const int v = m.vertex(marker);
   const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
   LatticePoint q;
@@ -58,34 +84,39 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const Lattice& lattice, const SlipView
   Vec3 along[3];
   lattice.cell_tangents(q, along);
   const Vec3 n = load(slip.normal, v), f = load(slip.force, v);
-  const double share = (slip.chi.extent(0) > 0 ? slip.chi(v) : 1.0) / (slip.viscosity * slip.area(v));
+  double share = slip_share_at_sides(block, eta) / (slip.viscosity * slip.area(v));
+  if (slip.gap.extent(0) > 0) {
+    double square = 0;  // of the spacing along the normal
+    for (int d = 0; d < 3; ++d) square += dot(along[d], n) * dot(along[d], n);
+    share *= slip_share(slip.gap(v) / std::sqrt(square));
+  }
   return share * slip_motion(slip.law, along, n, f - dot(f, n) * n);
 }
 
 /// Adds the slip to the velocity [vertex, 3] of vertices whose marker is at home.
-inline void add_slip(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers,
+inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers,
                      const Components<double>& velocity) {
-  const Lattice lattice = block.lattice;
+  const TransferBlock block = transfer_block;
   const auto of_vertex = velocity;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   Kokkos::parallel_for(
       "corpuscle::transfer::add_slip", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         const int v = m.vertex(marker);
-        if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(lattice, s, m, marker));
+        if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(block, s, m, marker));
       });
 }
 
 /// Power of the forces on the slip, nW, of the vertices at home here: friction near the membranes that the kernel smears away.
-inline double slip_power(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers) {
-  const Lattice lattice = block.lattice;
+inline double slip_power(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   double power = 0;
   Kokkos::parallel_reduce(
       "corpuscle::transfer::slip_power", Policy(0, m.count),
       KOKKOS_LAMBDA(int marker, double& sum) {
-        if (m.home(marker)) sum += dot(load(s.force, m.vertex(marker)), slip_velocity(lattice, s, m, marker));
+        if (m.home(marker)) sum += dot(load(s.force, m.vertex(marker)), slip_velocity(block, s, m, marker));
       },
       power);
   return power;

@@ -379,6 +379,7 @@ void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& to
   totals_ = totals;
   energy_.resume(totals.energy);
   if (simulation_.immersed()) simulation_.immersed()->resume(totals.immersed);
+  if (simulation_.coupling()) simulation_.coupling()->resume_contact(totals.contact);
 }
 
 /// All that has been counted, of this run and those before it.
@@ -388,6 +389,8 @@ RunTotals FlowOutput::totals_now(bool together) {
   RunTotals now = totals_;
   now.energy = energy_.state();
   if (simulation_.immersed() && together) now.immersed = simulation_.immersed()->report();
+  if (simulation_.coupling())
+    if (const auto contact = simulation_.coupling()->contact_report()) now.contact = *contact;
   now.wall_s += largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
   for (const auto& [part, seconds] : timers_.seconds()) now.wall_s_by_part[part] += largest(seconds);
   return now;
@@ -404,6 +407,8 @@ void FlowOutput::fill_energy(Report& report) const {
   if (const auto own = energy_.coupling_imbalance()) report.errors["energy_balance_coupling"] = *own;
   terms["on_cells"] = t.on_cells;
   terms["elastic"] = t.elastic;
+  if (t.pushed != 0) terms["pushed"] = t.pushed;
+  if (scene_.contact) terms["contact"] = t.contact;
   terms["membrane_dissipation"] = t.membrane_dissipation;
   terms["membrane_kinetic"] = t.membrane_kinetic;
 }
@@ -456,6 +461,12 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
     if (search.least_wall_spacings < 1e30) errors["least_wall_spacings"] = search.least_wall_spacings;
     if (search.least_body_spacings < 1e30)
       errors["least_body_spacings"] = report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
+  }
+  if (simulation_.coupling() && simulation_.coupling()->contact_report()) {
+    errors["crossings"] = now.contact.crossings;
+    report.extra["contact"] = {{"crossings", now.contact.crossings}, {"lists", now.contact.lists}};
+    report.extra["contact"]["smallest_gap_um"] =
+        now.contact.smallest_gap < 1e30 ? nlohmann::json(now.contact.smallest_gap) : nlohmann::json();
   }
   if (simulation_.membranes()) {
     errors["volume_drift"] = now.volume_drift;

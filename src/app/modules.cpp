@@ -51,6 +51,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   const bool force = fluid && cells && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   add("immersed search", fluid && ((cells && !force) || bodies));
   add("transfer of forces", force);
+  add("contact", force && scene.contact);
   add("rigid bodies", bodies);
   add("membrane", cells);
   add("membrane viscosity", viscous);

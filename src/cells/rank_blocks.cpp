@@ -72,10 +72,7 @@ int RankBlocks::owner(const Vec3& point) const {
 }
 
 bool RankBlocks::reaches(const Box& box, int rank) const {
-  const Box& block = around_[rank];
-  for (int d = 0; d < 3; ++d)
-    if (!(box.lower[d] <= block.upper[d] && box.upper[d] >= block.lower[d])) return false;
-  return true;
+  return overlap(box, around_[rank]);
 }
 
 }  // namespace corpuscle

@@ -15,6 +15,12 @@ struct Box {
   Vec3 lower, upper;
 };
 
+inline bool overlap(const Box& a, const Box& b) {
+  for (int d = 0; d < 3; ++d)
+    if (!(a.lower[d] <= b.upper[d] && a.upper[d] >= b.lower[d])) return false;
+  return true;
+}
+
 class RankBlocks {
  public:
   /// Every rank calls. @param layers  cells around a rank's own in which it must know of surfaces, at most the halo

@@ -224,11 +224,31 @@ void SharedCells::distribute(const std::vector<int>& owners) {
   set_own(carried);
 }
 
+/// Of every rank, the box around its own cells; none without contact. After measure(), with boxes_host_.
+std::vector<Box> SharedCells::find_reach() const {
+  std::vector<Box> reach;
+  if (contact_ == 0) return reach;
+  std::vector<double> all(6 * static_cast<std::size_t>(blocks_.ranks()), 0.0);
+  double* mine = all.data() + 6 * static_cast<std::size_t>(comm_.rank());
+  for (int d = 0; d < 3; ++d) mine[d] = 1e300, mine[3 + d] = -1e300;
+  for (std::size_t c = 0; c < own_.size(); ++c) {
+    const Box box = box_of(boxes_host_, static_cast<int>(c), skin_);
+    for (int d = 0; d < 3; ++d) {
+      mine[d] = std::min(mine[d], box.lower[d]);
+      mine[3 + d] = std::max(mine[3 + d], box.upper[d]);
+    }
+  }
+  comm_.sum(all.data(), static_cast<int>(all.size()));
+  for (std::size_t n = 0; n < all.size(); n += 6) reach.push_back({{all[n], all[n + 1], all[n + 2]}, {all[n + 3], all[n + 4], all[n + 5]}});
+  return reach;
+}
+
 /// After measure().
 void SharedCells::renew_copies() {
   ++renewals_;
   Kokkos::deep_copy(boxes_host_, boxes_);
   Kokkos::deep_copy(before_, boxes_);
+  const std::vector<Box> reach = find_reach();
   std::map<int, std::vector<CopyMessages::Copy>> wanted;
   Parcels notices;
   for (std::size_t c = 0; c < own_.size(); ++c) {
@@ -236,7 +256,8 @@ void SharedCells::renew_copies() {
     for (std::size_t image = 0; image < shifts_.size(); ++image) {
       const Box seen{box.lower + shifts_[image], box.upper + shifts_[image]};
       for (int rank = 0; rank < blocks_.ranks(); ++rank) {
-        if ((image == 0 && rank == comm_.rank()) || !blocks_.reaches(seen, rank)) continue;
+        if (image == 0 && rank == comm_.rank()) continue;
+        if (!blocks_.reaches(seen, rank) && !(contact_ > 0 && overlap(seen, reach[rank]))) continue;
         const Notice notice{own_[c].type, own_[c].number, static_cast<int>(image)};
         put(notices[rank], &notice, 1);
         wanted[rank].push_back(

@@ -25,11 +25,12 @@ class SharedCells {
  public:
   /// Every rank calls, with all cells.
   /// @param layers      cells around a rank's own in which it must know of surfaces
-  /// @param contact_um  within which surfaces must know of each other wherever their ranks are
+  /// @param contact_um  a rank has copies of cells that are so near to its own; 0: only those that reach into its block
   /// @throws InputError  as Membranes
   SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
               std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
+  const Comm& comm() const { return comm_; }
   Membranes& membranes() { return *membranes_; }
   const Membranes& membranes() const { return *membranes_; }
   const SurfaceSet& surfaces() const { return membranes_->surfaces(); }
@@ -75,6 +76,7 @@ class SharedCells {
   void distribute(const std::vector<int>& owners);
   void set_own(const std::vector<double>& carried);
   void renew_copies();
+  std::vector<Box> find_reach() const;
   std::vector<int> owners() const;
 
   Comm comm_;

@@ -1,6 +1,7 @@
 // How bodies and the flow around them advance together: one interface for every way there is.
 #pragma once
 
+#include "contact/contact_report.hpp"
 #include "coupling/immersed_flow.hpp"
 #include "coupling/rigid_bodies.hpp"
 #include "coupling/step_schedule.hpp"
@@ -71,6 +72,13 @@ class Coupling {
   virtual double power_on_cells() { return 0; }
   /// Friction beside the membranes that the grid does not show, nW.
   virtual double unresolved_dissipation() { return 0; }
+
+  /// Of forces on the cells from outside, nW, and what the contacts between them have stored after a step of that length, fJ.
+  virtual double power_of_pushes() { return 0; }
+  virtual double contact_energy(double) { return 0; }
+  /// How contacts went; nothing without [contact].
+  virtual std::optional<ContactReport> contact_report() const { return std::nullopt; }
+  virtual void resume_contact(const ContactReport&) {}
 
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.

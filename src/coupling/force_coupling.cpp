@@ -28,6 +28,12 @@ Case without_cells(const Case& scene) {
   return rest;
 }
 
+/// Within which cells act on each other, um.
+double contact_reach(const Case& scene) {
+  if (!scene.contact) return 0;
+  return std::max(scene.contact->range_um, scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0.0);
+}
+
 }  // namespace
 
 ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers)
@@ -36,11 +42,12 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       timers_(timers),
       lengths_us_(schedule.lengths_us()),
       workspace_(std::make_shared<Workspace>()),
-      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, 0.0, workspace_)),
+      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, contact_reach(scene), workspace_)),
       membranes_(&cells_->membranes()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
+  if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
   fluid.set_face_force(transfer_->faces());
   fluid.raise_reference_speed(quiet_speed_);
   take_up();
@@ -136,6 +143,7 @@ void ForceCoupling::check_start() {
         nearest_outflow(), outflow_limit_);
   }
   measure_stability();
+  if (loads_) loads_->look_at_start(lengths_us_.front());
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (!(longest <= stable_us_))
     throw InputError(
@@ -166,7 +174,9 @@ void ForceCoupling::measure_stability() {
   model.viscosity = fluid_.viscosity();
   model.radius = (three ? 0.91 : 1.25) * spacing;  // of a marker alone: Delong et al., J. Chem. Phys. 140, 2014
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
-  stable_us_ = limit / fluid_.grid().comm().max(membranes_->fastest_relaxation_per_us(model));
+  const double fastest =
+      std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
+  stable_us_ = limit / fluid_.grid().comm().max(fastest);
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
@@ -204,17 +214,22 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   const double ahead = second_order(dt) ? dt : 0;
   {
     const auto scope = timers_.scope("membrane");
-    if (cells_->begin_step(ahead)) take_up();
+    begin_step(time, dt, ahead);
     membranes_->set_out(ahead);
     cells_->to_copies(surfaces().x, true);
+    if (loads_ && ahead > 0) loads_->limit_approach();
     together([&] { membranes_->compute_forces(); });
-    cells_->to_copies(membranes_->views().force);
     update_surface_geometry(surfaces());
   }
   {
     const auto scope = timers_.scope("transfer");
     place(time);
-    transfer_->spread(membranes_->views().force);
+    if (loads_) {
+      const auto contact = timers_.scope("contact");
+      loads_->gather(dt, second_order(dt));
+    }
+    cells_->to_copies(forces());
+    transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
   {
@@ -223,16 +238,47 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     transfer_->interpolate(fluid_.flux(), fluid_.velocity(), scene_.coupling->slip ? &slip : nullptr, surfaces().v);
     cells_->add_copies(surfaces().v);
   }
-  const auto scope = timers_.scope("membrane");
-  together([&] { membranes_->drift(dt, second_order(dt) ? 0.5 : 0); });
+  {
+    const auto scope = timers_.scope("membrane");
+    together([&] { membranes_->drift(dt, second_order(dt) ? 0.5 : 0); });
+  }
+  if (loads_) after_move(time + dt, dt);
   StepStatistics statistics;
   statistics.coupling_iterations = 1;
   statistics.substeps = 1;
   return statistics;
 }
 
+/// Cells that have come to this rank, or copies that are others than before, are looked at where the last step left them.
+void ForceCoupling::begin_step(double time, double dt, double ahead) {
+  if (!cells_->begin_step(ahead)) return;
+  take_up();
+  if (!loads_) return;
+  loads_->take_up();
+  update_copies();
+  loads_->look(time, dt);
+}
+
+void ForceCoupling::update_copies() {
+  cells_->to_copies(surfaces().x, true);
+  cells_->to_copies(surfaces().v);
+}
+
+void ForceCoupling::after_move(double time, double dt) {
+  const auto scope = timers_.scope("contact");
+  update_copies();
+  loads_->limit_approach();
+  loads_->look(time, dt);
+}
+
+void ForceCoupling::resume(double time) {
+  if (!loads_) return;
+  update_copies();
+  loads_->look(time, lengths_us_.front());
+}
+
 SlipViews ForceCoupling::slip_of_membranes() const {
-  return transfer_->slip(surfaces(), membranes_->views().force, fluid_.viscosity(), slip_share_);
+  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), loads_ ? loads_->gaps() : Array<double>());
 }
 
 double ForceCoupling::unresolved_dissipation() {
@@ -243,7 +289,7 @@ double ForceCoupling::unresolved_dissipation() {
 const Components<double>& ForceCoupling::tractions_for_output() {
   const std::size_t vertices = membranes_->vertices();
   traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);
-  force_per_area(membranes_->vertices(), membranes_->views().force, surfaces().area, -1, traction_);
+  force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);
   return traction_;
 }
 
@@ -262,6 +308,7 @@ std::vector<Triple> ForceCoupling::wrapped_by() const {
 void ForceCoupling::cells_restored() {
   cells_->to_copies(surfaces().x, true);
   take_up();
+  if (loads_) loads_->take_up();
   place(0);
 }
 

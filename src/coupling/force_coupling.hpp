@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cells/shared_cells.hpp"
+#include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
@@ -25,8 +26,15 @@ class ForceCoupling : public Coupling {
   std::map<std::string, double> report(double dt_us) const override;
   double power_on_cells() override;
   double unresolved_dissipation() override;
+  double power_of_pushes() override { return loads_ ? loads_->power_of_pushes() : 0; }
+  double contact_energy(double dt_us) override { return loads_ ? loads_->contact_energy(dt_us) : 0; }
+  std::optional<ContactReport> contact_report() const override { return loads_ ? loads_->report() : std::nullopt; }
+  void resume_contact(const ContactReport& report) override {
+    if (loads_) loads_->resume(report);
+  }
 
   void cells_restored() override;
+  void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
   const SurfaceSet& surfaces() const override { return cells_->surfaces(); }
   Membranes* membranes() override { return membranes_; }
@@ -42,7 +50,12 @@ class ForceCoupling : public Coupling {
   void together(const Work& work) const;
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
+  /// The sum of all forces at the last gathering of loads.
+  const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;
+  void begin_step(double time_us, double dt_us, double ahead_us);
+  void update_copies();
+  void after_move(double time_us, double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
 
@@ -55,7 +68,7 @@ class ForceCoupling : public Coupling {
   Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
-  Array<double> slip_share_;                    // [vertex] empty: 1
+  std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely
   double stable_us_ = 0;      // largest stable step at the start

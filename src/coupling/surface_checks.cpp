@@ -197,8 +197,7 @@ void check_outside(const HostSurfaces& s, int inner, int outer, const Triple& sh
   if (inside == looked)
     throw InputError(fmt::format("{} lies inside {}, near {}; a body is solid throughout: move them apart (center_um)",
                                  body_name(s.set, inner), body_name(s.set, outer), there));
-  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}. Contact forces do not exist yet: move them apart "
-                               "(center_um, axis)",
+  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}: move them apart (center_um, axis)",
                                body_name(s.set, first), body_name(s.set, second), there));
 }
 

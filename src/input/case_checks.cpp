@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 
 namespace corpuscle {
 namespace {
@@ -47,6 +48,32 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
     if (scene.cells[c].membrane_viscosity_N_s_per_m > 0)
       complain(scene.cells[c].type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", scene.cells[c].type),
                "membrane_viscosity_N_s_per_m", "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
+}
+
+/// What pushes cells from outside must have something that holds them.
+void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
+  Triple sum{};
+  int first = -1;
+  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+    for (int d = 0; d < 3; ++d) {
+      if (scene.cells[c].push_nN[d] != 0 && first < 0) first = static_cast<int>(c);
+      sum[d] += scene.cells[c].push_nN[d];
+    }
+  if (first < 0) return;
+  const std::string cell = fmt::format("cells.{}", first);
+  if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force)
+    complain(cell, "push_nN", "only membranes that are forces (coupling.scheme = \"force\") can be pushed: leave it out, or use that scheme");
+  for (int side : entry_of) {
+    const auto type = scene.boundaries[side].type;
+    if (type != Type::periodic && type != Type::symmetry) return;
+  }
+  constexpr double rounding = 1e-9;  // nN
+  for (int d = 0; d < 3; ++d)
+    if (std::abs(sum[d]) > rounding)
+      complain(cell, "push_nN",
+               fmt::format("all pushes add up to [{:g}, {:g}, {:g}] nN, and with periodic or symmetry sides all round nothing holds the "
+                           "fluid: it would go ever faster; make them add up to zero, or give the grid a wall",
+                           sum[0], sum[1], sum[2]));
 }
 
 /// Whether each part of the gradient has periodic sides to drive fluid between, on grids whose index directions are x, y, z;
@@ -97,6 +124,7 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
     complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
 
   check_gradient(scene, entry_of, complain);
+  check_pushes(scene, entry_of, complain);
 }
 
 void check_modules(const Case& scene, const Complaint& complain) {
@@ -106,11 +134,15 @@ void check_modules(const Case& scene, const Complaint& complain) {
                                                              {scene.grid.has_value(), "grid"},
                                                              {!scene.boundaries.empty(), "boundary"},
                                                              {!scene.bodies.empty(), "bodies"},
-                                                             {scene.coupling.has_value(), "coupling"}})
+                                                             {scene.coupling.has_value(), "coupling"},
+                                                             {scene.contact.has_value(), "contact"}})
       if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
     if (scene.cells.size() != 1)
       complain("stretching", "",
                fmt::format("a stretching test pulls one cell; the case has {} [[cells]]", scene.cells.size()));
+    for (std::size_t c = 0; c < scene.cells.size(); ++c)
+      if (scene.cells[c].push_nN != Triple{})
+        complain(fmt::format("cells.{}", c), "push_nN", "a stretching test pulls with stretching.force_pN: leave this out");
     return;
   }
   if (!scene.fluid && !scene.bodies.empty()) complain("bodies", "", "rigid bodies need a [fluid]");
@@ -121,6 +153,10 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (scene.coupling && scene.cells.empty())
     complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
   if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) check_force_scheme(scene, complain);
+  if (scene.contact && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
+    complain("contact", "",
+             scene.cells.empty() ? "there are no [[cells]] to touch each other: leave this section out"
+                                 : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
   check_boundaries(scene, complain);
 }
 

@@ -64,6 +64,8 @@ class Membranes {
   /// What belongs to the own cells' vertices from one step to the next, and travels with them: [vertex, 3] each.
   std::vector<Components<double>> carried() const { return {views_.surface.x, views_.surface.v}; }
   const std::vector<CellReference>& types() const { return types_; }
+  /// One body for each type, as it is made or read; only with hold().
+  const SurfaceSet& templates() const { return templates_; }
 
   /// The surfaces as the fluid sees them; x and v are the membranes' own arrays. Normals and areas are refreshed by
   /// update_surface_geometry, not here.

@@ -16,7 +16,8 @@ View make(const char* name, Extents... extents) {
 }
 
 /// Bounds of the lattice in space, widened by one of its links.
-void find_bounds(const Lattice& lattice, MarkerSearch& search) {
+/// @returns the longest link
+double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lattice.x);
   double link = 0;
   search.lower = {1e300, 1e300, 1e300};
@@ -34,6 +35,7 @@ void find_bounds(const Lattice& lattice, MarkerSearch& search) {
       }
   search.lower -= {link, link, link};
   search.upper += {link, link, link};
+  return link;
 }
 
 void set_reflections(const std::vector<BoundarySettings>& boundaries, TransferBlock& block) {
@@ -68,7 +70,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   }
   set_reflections(boundaries, block_);
   search_.lattice = block_.lattice;
-  find_bounds(block_.lattice, search_);
+  largest_spacing_ = find_bounds(block_.lattice, search_);
   with_kernel([&](auto delta) { search_.reach = decltype(delta)::reach; });
   places_.beyond = make<Array<int>>("beyond", 1);
   beyond_host_ = HostCopy(places_.beyond);
@@ -144,10 +146,10 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
 }
 
 SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                         const Array<double>& chi) const {
+                         const Array<double>& gap) const {
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
-  return {law, viscosity, force, surface.normal, surface.area, chi};
+  return {law, viscosity, force, surface.normal, surface.area, gap};
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }

@@ -35,11 +35,14 @@ class Transfer {
   void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                    const Components<double>& velocity);
   /// What the slip of a membrane depends on, with this kernel's law.
+  /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                 const Array<double>& chi = {}) const;
+                 const Array<double>& gap = {}) const;
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
+  /// The widest spacing of this rank's block, um.
+  double largest_spacing() const { return largest_spacing_; }
   int markers() const { return markers_.count; }
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
@@ -59,6 +62,7 @@ class Transfer {
   MarkerViews markers_;
   std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
+  double largest_spacing_ = 0;
   FaceForce faces_;
 };
 

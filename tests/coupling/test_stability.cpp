@@ -123,12 +123,11 @@ TEST_CASE("cells too close to each other are refused, and stopped when they come
     return scene;
   };
   CHECK_THROWS_AS(run(followed_at(3, 1)), InputError);
-  // 1.3 spacings between the rims at the start: the film is not resolved, and it ends where they come too near or cross.
-  CHECK_THROWS_MATCHES(run(followed_at(5, 60)), ComputationError, Catch::Matchers::Predicate<ComputationError>([](const auto& error) {
+  // 1.3 spacings between the rims: a plane of nodes between the two cells, all of them beside one or the other.
+  CHECK_THROWS_MATCHES(run(followed_at(5, 1)), InputError, Catch::Matchers::Predicate<InputError>([](const auto& error) {
     const std::string text = error.what();
-    return (text.find("gap between bodies") != text.npos || text.find("surfaces cross") != text.npos) &&
-           text.find("cells.0 and cells.1") != text.npos;
-  }, "names both cells"));
+    return text.find("film between bodies: cells.") != text.npos && text.find("grid.nodes") != text.npos;
+  }, "names the film"));
   require_sound(followed_at(10, 10));
 }
 
