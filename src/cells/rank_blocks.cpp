@@ -71,7 +71,7 @@ int RankBlocks::owner(const Vec3& point) const {
   return static_cast<int>(nearest / samples);
 }
 
-bool RankBlocks::reaches(const Box& box, int rank) const {
+bool RankBlocks::reaches(const SpaceBox& box, int rank) const {
   return overlap(box, around_[rank]);
 }
 

@@ -11,11 +11,11 @@ namespace corpuscle {
 /// Shifts by whole periods under which cells are seen: the identity first, then all by one period or none along each direction.
 std::vector<Vec3> period_shifts(const Grid& grid);
 
-struct Box {
+struct SpaceBox {
   Vec3 lower, upper;
 };
 
-inline bool overlap(const Box& a, const Box& b) {
+inline bool overlap(const SpaceBox& a, const SpaceBox& b) {
   for (int d = 0; d < 3; ++d)
     if (!(a.lower[d] <= b.upper[d] && a.upper[d] >= b.lower[d])) return false;
   return true;
@@ -29,13 +29,13 @@ class RankBlocks {
   /// The rank in whose block, or nearest to it, a point inside the domain lies, up to a cell or so where blocks differ in size.
   int owner(const Vec3& point) const;
   /// Whether a box reaches into a rank's block and layers.
-  bool reaches(const Box& box, int rank) const;
+  bool reaches(const SpaceBox& box, int rank) const;
   int ranks() const { return static_cast<int>(around_.size()); }
 
  private:
   static constexpr int samples = 8;  // of a block: the middles of its eighths
 
-  std::vector<Box> around_;     // [rank] its cells and layers
+  std::vector<SpaceBox> around_;     // [rank] its cells and layers
   std::vector<Vec3> samples_;   // [rank * samples]
   PeriodicFrame frame_;
 };

@@ -22,8 +22,8 @@ struct Notice {
 
 Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
 
-Box box_of(const HostMirror<Table<double>>& boxes, int cell, double margin) {
-  Box box;
+SpaceBox box_of(const HostMirror<Table<double>>& boxes, int cell, double margin) {
+  SpaceBox box;
   for (int d = 0; d < 3; ++d) {
     box.lower[d] = boxes(cell, BoxColumn::lower + d) - margin;
     box.upper[d] = boxes(cell, BoxColumn::upper + d) + margin;
@@ -225,14 +225,14 @@ void SharedCells::distribute(const std::vector<int>& owners) {
 }
 
 /// Of every rank, the box around its own cells; none without contact. After measure(), with boxes_host_.
-std::vector<Box> SharedCells::find_reach() const {
-  std::vector<Box> reach;
+std::vector<SpaceBox> SharedCells::find_reach() const {
+  std::vector<SpaceBox> reach;
   if (contact_ == 0) return reach;
   std::vector<double> all(6 * static_cast<std::size_t>(blocks_.ranks()), 0.0);
   double* mine = all.data() + 6 * static_cast<std::size_t>(comm_.rank());
   for (int d = 0; d < 3; ++d) mine[d] = 1e300, mine[3 + d] = -1e300;
   for (std::size_t c = 0; c < own_.size(); ++c) {
-    const Box box = box_of(boxes_host_, static_cast<int>(c), skin_);
+    const SpaceBox box = box_of(boxes_host_, static_cast<int>(c), skin_);
     for (int d = 0; d < 3; ++d) {
       mine[d] = std::min(mine[d], box.lower[d]);
       mine[3 + d] = std::max(mine[3 + d], box.upper[d]);
@@ -248,13 +248,13 @@ void SharedCells::renew_copies() {
   ++renewals_;
   Kokkos::deep_copy(boxes_host_, boxes_);
   Kokkos::deep_copy(before_, boxes_);
-  const std::vector<Box> reach = find_reach();
+  const std::vector<SpaceBox> reach = find_reach();
   std::map<int, std::vector<CopyMessages::Copy>> wanted;
   Parcels notices;
   for (std::size_t c = 0; c < own_.size(); ++c) {
-    const Box box = box_of(boxes_host_, static_cast<int>(c), skin_ + contact_);
+    const SpaceBox box = box_of(boxes_host_, static_cast<int>(c), skin_ + contact_);
     for (std::size_t image = 0; image < shifts_.size(); ++image) {
-      const Box seen{box.lower + shifts_[image], box.upper + shifts_[image]};
+      const SpaceBox seen{box.lower + shifts_[image], box.upper + shifts_[image]};
       for (int rank = 0; rank < blocks_.ranks(); ++rank) {
         if (image == 0 && rank == comm_.rank()) continue;
         if (!blocks_.reaches(seen, rank) && !(contact_ > 0 && overlap(seen, reach[rank]))) continue;

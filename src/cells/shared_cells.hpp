@@ -76,7 +76,7 @@ class SharedCells {
   void distribute(const std::vector<int>& owners);
   void set_own(const std::vector<double>& carried);
   void renew_copies();
-  std::vector<Box> find_reach() const;
+  std::vector<SpaceBox> find_reach() const;
   std::vector<int> owners() const;
 
   Comm comm_;

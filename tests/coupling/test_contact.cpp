@@ -44,13 +44,6 @@ Case pressed_cells(double gap_um, double push_nN, double step_us, double end_us,
   return scene;
 }
 
-std::vector<double> positions(FlowSimulation& simulation) {
-  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), simulation.surfaces()->x);
-  std::vector<double> all;
-  for (std::size_t i = 0; i < x.extent(0); ++i)
-    for (int d = 0; d < 3; ++d) all.push_back(x(i, d));
-  return all;
-}
 
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   double most = 0;
