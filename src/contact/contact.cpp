@@ -116,6 +116,7 @@ ContactViews Contact::make_contacts() const {
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
 void Contact::make_lists(double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
+  if (surface_.vertices == 0) return;  // on this rank, at present
   if (skin_ >= 0 && largest_way(surface_, listed_, dt) < 0.5 * skin_) return;
   Kokkos::deep_copy(Exec(), listed_, surface_.x);
   const double way = largest_way(surface_, listed_, dt);
@@ -151,11 +152,17 @@ bool Contact::correct(double share, double least) {
     double shortfall = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um);
     if (peers_) shortfall = peers_->comm.max(shortfall);
     if (shortfall <= enough) return true;
-    sort_hits(surface_, lists_.groups, now_);
-    add_pushes(surface_, lists_, now_, own_, surface_.x);
+    push(now_, surface_.x);
     if (peers_) peers_->update_copies();
   }
   return false;
+}
+
+/// Adds the contacts' pushes to `sum` [vertex, 3] of this rank's own.
+void Contact::push(const ContactViews& contacts, const Components<double>& sum) {
+  if (surface_.vertices == 0) return;
+  sort_hits(surface_, lists_.groups, contacts);
+  add_pushes(surface_, lists_, contacts, own_, sum);
 }
 
 void Contact::limit_approach() { correct(keep_share, 0); }
@@ -266,8 +273,7 @@ void Contact::add_forces(double dt, bool ahead, const Components<double>& force)
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
   contact_forces(surface_, law(dt), rest_, lists_, contacts);
-  sort_hits(surface_, lists_.groups, contacts);
-  add_pushes(surface_, lists_, contacts, own_, force);
+  push(contacts, force);
 }
 
 double Contact::energy(double dt) const {

@@ -67,6 +67,7 @@ class Contact {
 
  private:
   void make_arrays();
+  void push(const ContactViews& contacts, const Components<double>& sum);
   CrossingCount crossings();
   double smallest_gap() const;
   std::string told_text(const CrossingCount& found) const;
