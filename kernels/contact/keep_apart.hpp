@@ -15,20 +15,41 @@ struct GapGoal {
   int cells_vertices = 0;  // vertices that can move
 };
 
+/// What the gaps of a move fall short of.
+struct Shortfall {
+  double most = 0;      // over the goal itself
+  int limited = 0;      // contacts below their goal
+  int through = 0;      // of them, those whose vertex is on the wrong side
+  int first = 1 << 30;  // the lowest of these
+
+  template <class Other>
+  KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
+    most = larger(most, b.most);
+    limited = limited + b.limited;
+    through = through + b.through;
+    if (b.first < first) first = b.first;
+  }
+  KOKKOS_INLINE_FUNCTION Shortfall& operator+=(const Shortfall& b) {
+    join(b);
+    return *this;
+  }
+  KOKKOS_INLINE_FUNCTION void operator+=(const volatile Shortfall& b) volatile { join(b); }
+};
+
 /// push: the way by which vertex and corners must move for the gap, along the normal as it was found, to be at least
 /// the goal.
-/// @returns the largest shortfall over the goal itself
-inline double gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
-                              const ContactViews& contacts, const GapGoal& gap_goal, double range) {
+/// @param counted  of the first so many vertices contacts count
+inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
+                                 const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const GapGoal goal = gap_goal;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
-  double most = 0;
+  Shortfall all;
   Kokkos::parallel_reduce(
       "corpuscle::contact::gap_corrections", Policy(0, s.vertices),
-      KOKKOS_LAMBDA(int v, double& worst) {
+      KOKKOS_LAMBDA(int v, Shortfall& sum) {
         for (int g = first(v); g < first(v + 1); ++g) {
           c.push(g) = 0;
           if (c.item(g) < 0 || c.gap(g) >= range || (goal.share == 0 && c.gap(g) >= 0)) continue;
@@ -42,12 +63,15 @@ inline double gap_corrections(const SurfaceSet& surface, const Images& image_shi
           for (int d = 0; d < 3; ++d)
             if (s.triangle(t, d) < goal.cells_vertices) mobility += c.weight(g, d) * c.weight(g, d);
           c.push(g) = goal.relax * (wanted - now) / mobility;
-          const double short_by = (wanted - now) / wanted;
-          worst = larger(worst, short_by);
+          Shortfall own;
+          own.most = (wanted - now) / wanted;
+          if (v < counted) own.limited = 1;
+          if (v < counted && now < 0) own.through = 1, own.first = g;
+          sum += own;
         }
       },
-      Largest(most));
-  return most;
+      all);
+  return all;
 }
 
 /// Side on which a vertex saw its own body last: item * 2 + 1 outside, item * 2 inside; -1 where nothing was within
@@ -62,11 +86,13 @@ KOKKOS_INLINE_FUNCTION bool adjacent(const SurfaceSet& s, int t, int other) {
 struct CrossingCount {
   int vertices = 0;     // on the wrong side
   int first = 1 << 30;  // the lowest contact of them
+  double deepest = 0;   // um
 
   template <class Other>
   KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
     vertices = vertices + b.vertices;
     if (b.first < first) first = b.first;
+    if (b.deepest > deepest) deepest = b.deepest;
   }
   KOKKOS_INLINE_FUNCTION CrossingCount& operator+=(const CrossingCount& b) {
     join(b);
@@ -107,6 +133,7 @@ inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactList
             CrossingCount own;
             own.vertices = 1;
             own.first = g;
+            own.deepest = -c.gap(g);
             sum += own;
           }
         }

@@ -104,7 +104,7 @@ inline int complete_stress(const SurfaceSet& surface, const SurfaceStress& found
         });
       },
       Kokkos::Min<int>(guessed));
-  return guessed;
+  return guessed < no_vertex ? guessed : no_vertex;
 }
 
 /// Force (0 to 2) and torque about `centre` (3 to 5) of each body: [body, 6], nN and nN um. The vertices of a body are

@@ -56,21 +56,31 @@ KOKKOS_INLINE_FUNCTION double slip_share(double spacings) {
 }
 constexpr double slip_reach = 1.5;  // spacings
 
-/// How much is left beside a side that gives the velocity along itself. There the kernel is folded back, and a force along a
-/// plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side itself
-/// (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
-KOKKOS_INLINE_FUNCTION double slip_share_at_sides(const TransferBlock& block, const double (&eta)[3]) {
-  constexpr double whole = 0.6;  // spacings
-  double share = 1;
-  for (int d = 0; d < 3; ++d) {
-    const double below = eta[d] + 0.5, above = block.index().n[d] - 0.5 - eta[d];
-    double gap = whole;
-    if (block.lattice.boundary_below[d] && block.reflection[d][0][0] < 0 && below < gap) gap = below;
-    if (block.lattice.boundary_above[d] && block.reflection[d][1][0] < 0 && above < gap) gap = above;
-    const double left = gap > 0 ? 1 - gap / whole : 1;
-    share *= 1 - left * left;
-  }
-  return share;
+/// How much is left beside a side that gives the velocity, of the slip along it. There the kernel is folded back, and a force
+/// along a plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side
+/// itself (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
+KOKKOS_INLINE_FUNCTION double slip_share_along_side(double spacings) {
+  constexpr double whole = 0.6;
+  if (spacings >= whole) return 1;
+  const double left = spacings > 0 ? 1 - spacings / whole : 1;
+  return 1 - left * left;
+}
+
+/// Takes from v what half of the way to no slip takes beside the block's sides: applied to the force and to the motion, so that
+/// the one is as the other for both. Across a side less is left than along it, so that no slip carries a membrane through it.
+KOKKOS_INLINE_FUNCTION Vec3 fade_at_sides(const TransferBlock& block, const double (&eta)[3], const Vec3 (&along)[3], Vec3 v) {
+  for (int d = 0; d < 3; ++d)
+    for (int end = 0; end < 2; ++end) {
+      if (!(end == 0 ? block.lattice.boundary_below[d] : block.lattice.boundary_above[d])) continue;
+      if (block.reflection[d][end][1] > 0) continue;  // fluid leaves through it
+      const double gap = end == 0 ? eta[d] + 0.5 : block.index().n[d] - 0.5 - eta[d];
+      if (gap >= slip_reach) continue;
+      const Vec3 across = cross(along[(d + 1) % 3], along[(d + 2) % 3]), n = (1 / norm(across)) * across;
+      const bool sticks = block.reflection[d][end][0] < 0;
+      const double beside = sticks ? std::sqrt(slip_share_along_side(gap)) : 1, through = std::sqrt(slip_share(gap));
+      v = beside * v + ((through - beside) * dot(v, n)) * n;
+    }
+  return v;
 }
 
 /// Of a marker's vertex, um/us.
@@ -84,13 +94,14 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const Slip
   Vec3 along[3];
   lattice.cell_tangents(q, along);
   const Vec3 n = load(slip.normal, v), f = load(slip.force, v);
-  double share = slip_share_at_sides(block, eta) / (slip.viscosity * slip.area(v));
+  double share = 1 / (slip.viscosity * slip.area(v));
   if (slip.gap.extent(0) > 0) {
     double square = 0;  // of the spacing along the normal
     for (int d = 0; d < 3; ++d) square += dot(along[d], n) * dot(along[d], n);
     share *= slip_share(slip.gap(v) / std::sqrt(square));
   }
-  return share * slip_motion(slip.law, along, n, f - dot(f, n) * n);
+  const Vec3 tangential = fade_at_sides(block, eta, along, f - dot(f, n) * n);
+  return share * fade_at_sides(block, eta, along, slip_motion(slip.law, along, n, tangential));
 }
 
 /// Adds the slip to the velocity [vertex, 3] of vertices whose marker is at home.

@@ -464,7 +464,7 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   }
   if (simulation_.coupling() && simulation_.coupling()->contact_report()) {
     errors["crossings"] = now.contact.crossings;
-    report.extra["contact"] = {{"crossings", now.contact.crossings}, {"lists", now.contact.lists}};
+    report.extra["contact"] = {{"crossings", now.contact.crossings}, {"limited_approaches", now.contact.limited}, {"lists", now.contact.lists}};
     report.extra["contact"]["smallest_gap_um"] =
         now.contact.smallest_gap < 1e30 ? nlohmann::json(now.contact.smallest_gap) : nlohmann::json();
   }

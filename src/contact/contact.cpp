@@ -18,11 +18,12 @@ namespace corpuscle {
 
 namespace {
 
-constexpr double far_away = 1e30;     // um
-constexpr double keep_share = 0.5;    // of a gap, in one step
-constexpr double opening = 0.15;      // rate at which a film's gap follows its pressure, over gap and viscosity
-constexpr double followed = 0.5;      // of a gap's excess, that one step may undo
-constexpr double healed_share = 0.1;  // of the range, to which crossings are opened again
+constexpr double far_away = 1e30;      // um
+constexpr double keep_share = 0.5;     // of a gap, in one step
+constexpr double opening = 0.15;       // rate at which a film's gap follows its pressure, over gap and viscosity
+constexpr double followed = 0.5;       // of a gap's excess, that one step may undo
+constexpr double healed_share = 0.1;   // of the range, to which crossings are opened again
+constexpr double deepest_share = 0.8;  // of the range, from which crossings are put back
 constexpr int most_passes = 8, most_repairs = 20;
 constexpr long told = 5;  // crossings that are told one by one
 
@@ -101,12 +102,16 @@ void Contact::make_bins(double width) {
   sort_triangles(surface_, bins_);
 }
 
-ContactViews Contact::make_contacts() const {
+/// @param shares  the arrays of pushes and hits are those of the other contacts, which are never needed at the same
+/// time
+ContactViews Contact::make_contacts(const ContactViews* shares) const {
   ContactViews c;
+  if (shares) c = *shares;
   c.item = make<Array<int>>("contact_item", group_room_);
   c.gap = make<Array<double>>("contact_gap", group_room_);
   c.weight = make<Table<double>>("contact_weight", group_room_, 3);
   c.normal = make<Table<double>>("contact_normal", group_room_, 3);
+  if (shares) return c;
   c.push = make<Array<double>>("contact_push", group_room_);
   c.hit = make<Array<int>>("contact_hit", group_room_);
   c.hit_start = now_.hit_start.data() ? now_.hit_start : make<Array<int>>("hit_start", surface_.triangles + 1);
@@ -133,8 +138,7 @@ void Contact::make_lists(double dt) {
   lists_.groups = number_groups(lists_, surface_.vertices);
   if (lists_.groups > group_room_ || !now_.hit_start.data()) {
     group_room_ = lists_.groups + lists_.groups / 4;
-    now_ = make_contacts();
-    ahead_ = make_contacts();
+    now_ = make_contacts(nullptr);
   }
   ++report_.lists;
 }
@@ -144,18 +148,19 @@ void Contact::find(const ContactViews& contacts) {
   gaps_to_others(surface_, lists_, contacts, far_away, gap_);
 }
 
-/// Moves surfaces until no gap is below its goal. @returns whether that was to be reached
-bool Contact::correct(double share, double least) {
+/// Moves surfaces until no gap is below its goal. @returns what was short before
+Shortfall Contact::correct(double share, double least) {
   constexpr double relax = 0.6, enough = 1e-3;
   const GapGoal goal{share, least, relax, movable_};
+  Shortfall before;
   for (int pass = 0; pass < most_passes; ++pass) {
-    double shortfall = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um);
-    if (peers_) shortfall = peers_->comm.max(shortfall);
-    if (shortfall <= enough) return true;
+    const Shortfall now = shortfall(goal);
+    if (pass == 0) before = now;
+    if (now.most <= enough) break;
     push(now_, surface_.x);
     if (peers_) peers_->update_copies();
   }
-  return false;
+  return before;
 }
 
 /// Adds the contacts' pushes to `sum` [vertex, 3] of this rank's own.
@@ -165,7 +170,29 @@ void Contact::push(const ContactViews& contacts, const Components<double>& sum) 
   add_pushes(surface_, lists_, contacts, own_, sum);
 }
 
-void Contact::limit_approach() { correct(keep_share, 0); }
+void Contact::limit_ahead() { correct(keep_share, 0); }
+
+void Contact::limit_approach(double time) {
+  const Shortfall before = correct(keep_share, 0);
+  report_.limited += before.limited;
+  if (before.through > 0) count_crossings(before.through, before.first, time);
+}
+
+/// Of all ranks together, but for the contact that is named.
+Shortfall Contact::shortfall(const GapGoal& goal) {
+  Shortfall found = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um, own_);
+  if (!peers_) return found;
+  found.most = peers_->comm.max(found.most);
+  found.limited = static_cast<int>(peers_->comm.sum(static_cast<long>(found.limited)));
+  found.through = static_cast<int>(peers_->comm.sum(static_cast<long>(found.through)));
+  return found;
+}
+
+void Contact::count_crossings(int vertices, int first, double time) {
+  if (report_.crossings < told)
+    warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
+  report_.crossings += vertices;
+}
 
 std::string Contact::crossing_text(int contact) const {
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lists_.first_group);
@@ -187,48 +214,41 @@ std::string Contact::crossing_text(int contact) const {
 /// Of all ranks together, but for the contact that is named.
 CrossingCount Contact::crossings() {
   CrossingCount found = find_crossings(surface_, lists_, now_, side_, own_);
-  if (peers_) found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
+  if (!peers_) return found;
+  found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
+  found.deepest = peers_->comm.max(found.deepest);
   return found;
 }
 
 /// On all ranks, of the lowest rank that has one.
-std::string Contact::told_text(const CrossingCount& found) const {
-  const std::string mine = found.first < lists_.groups ? crossing_text(found.first) : "";
+std::string Contact::told_text(int first) const {
+  const std::string mine = first < lists_.groups ? crossing_text(first) : "";
   return peers_ ? agree(peers_->comm, mine) : mine;
 }
 
 /// Finds crossings and puts what has crossed back, as often as it takes.
-/// @returns how many vertices had crossed; -1 if some still have
-int Contact::cross(double time, bool tell) {
-  int crossed = 0;
+/// @throws ComputationError  if some is not to be put back: what has gone in far has no way that is its own
+void Contact::mend_crossings(double time) {
   for (int repair = 0; repair <= most_repairs; ++repair) {
     const CrossingCount found = crossings();
-    if (found.vertices == 0) return crossed;
-    if (repair == most_repairs) break;
-    if (repair == 0) {
-      crossed = found.vertices;
-      if (tell && report_.crossings < told)
-        warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(found), time, crossed);
-      report_.crossings += crossed;
-    }
+    if (found.vertices == 0) return;
+    if (repair == most_repairs || found.deepest > deepest_share * settings_.range_um)
+      throw ComputationError(fmt::format(
+          "surfaces cross: {} at {:.6g} us, {} vertices by up to {:.2g} um, too many or too far to be put back. Likely "
+          "cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise contact.pressure_Pa "
+          "or "
+          "contact.range_um, or reduce the load",
+          told_text(found.first), time, found.vertices, found.deepest));
+    if (repair == 0) count_crossings(found.vertices, found.first, time);
     correct(0, healed_share * settings_.range_um);
     find(now_);
   }
-  return -1;
 }
 
 void Contact::look(double time, double dt) {
   make_lists(dt);
   find(now_);
-  if (cross(time, true) < 0) {
-    const auto found = crossings();
-    throw ComputationError(
-        fmt::format("surfaces cross: {} at {:.6g} us, by {} vertices that could not be put back. Likely cause: a step "
-                    "too long, or a "
-                    "load that contact cannot hold: reduce time.step_us, raise contact.pressure_Pa or "
-                    "contact.range_um, or reduce the load",
-                    told_text(found), time, found.vertices));
-  }
+  mend_crossings(time);
   report_.smallest_gap = std::min(report_.smallest_gap, smallest_gap());
 }
 
@@ -244,7 +264,7 @@ void Contact::look_at_start(double dt) {
   if (found.vertices > 0)
     throw InputError(
         fmt::format("surfaces cross: {}, by {} vertices, before the first step: move them apart (center_um, axis)",
-                    told_text(found), found.vertices));
+                    told_text(found.first), found.vertices));
   report_.smallest_gap = smallest_gap();
 }
 
@@ -270,6 +290,7 @@ double Contact::fastest_relaxation_per_us() const {
 }
 
 void Contact::add_forces(double dt, bool ahead, const Components<double>& force) {
+  if (ahead && ahead_.item.extent(0) < now_.item.extent(0)) ahead_ = make_contacts(&now_);
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
   contact_forces(surface_, law(dt), rest_, lists_, contacts);

@@ -22,6 +22,9 @@ struct ContactPeers {
   std::function<void()> update_copies;  // positions of this rank's cells to all their copies
 };
 
+struct GapGoal;
+struct Shortfall;
+
 class Contact {
  public:
   /// @param surfaces  in the place where the bodies start; their areas are taken as those at rest
@@ -42,8 +45,11 @@ class Contact {
   /// The same before the first step, where crossings are an error of the input.
   /// @throws InputError
   void look_at_start(double dt);
-  /// After a move: no gap has lost more than half of what it was when look() saw it.
-  void limit_approach();
+  /// After a move: no gap has lost more than half of what it was when look() saw it. What went through is counted and
+  /// told.
+  void limit_approach(double time_us);
+  /// The same for positions that are only looked ahead to.
+  void limit_ahead();
 
   /// Adds the forces between surfaces at the present positions, which may be ahead of those that look() saw, to `force`
   /// [vertex, 3].
@@ -70,13 +76,15 @@ class Contact {
   void push(const ContactViews& contacts, const Components<double>& sum);
   CrossingCount crossings();
   double smallest_gap() const;
-  std::string told_text(const CrossingCount& found) const;
+  Shortfall shortfall(const GapGoal& goal);
+  std::string told_text(int first) const;
   void make_lists(double dt);
   void make_bins(double width);
-  ContactViews make_contacts() const;
+  ContactViews make_contacts(const ContactViews* shares) const;
   void find(const ContactViews& contacts);
-  bool correct(double share, double least);
-  int cross(double time_us, bool tell);
+  Shortfall correct(double share, double least);
+  void mend_crossings(double time_us);
+  void count_crossings(int vertices, int first, double time_us);
   std::string crossing_text(int contact) const;
 
   ContactSettings settings_;
@@ -89,7 +97,7 @@ class Contact {
   int bin_room_ = 0;
   ContactLists lists_;
   int item_room_ = 0, group_room_ = 0;
-  ContactViews now_, ahead_;   // at the positions of look(), and at those ahead
+  ContactViews now_, ahead_;   // at the positions of look(), and at those ahead if there are any
   Components<double> listed_;  // [vertex, 3] um, where the lists were made
   double skin_ = -1;           // um; negative before there are lists
   Array<int> side_;            // [vertex]

@@ -64,8 +64,12 @@ void CellLoads::look(double time, double dt) {
   if (contact_) contact_->look(time, dt);
 }
 
-void CellLoads::limit_approach() {
-  if (contact_) contact_->limit_approach();
+void CellLoads::limit_approach(double time) {
+  if (contact_) contact_->limit_approach(time);
+}
+
+void CellLoads::limit_ahead() {
+  if (contact_) contact_->limit_ahead();
 }
 
 void CellLoads::gather(double dt, bool ahead) {

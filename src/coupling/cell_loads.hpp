@@ -26,7 +26,9 @@ class CellLoads {
   /// @throws ComputationError  if they cannot be
   void look(double time_us, double dt_us);
   /// After a move: gaps must not close.
-  void limit_approach();
+  void limit_approach(double time_us);
+  /// The same for positions that are only looked ahead to.
+  void limit_ahead();
 
   /// The sum of all forces on the fluid, [vertex, 3] nN. After Transfer::place().
   /// @param ahead  the membranes are ahead of where look() saw them

@@ -243,6 +243,9 @@ TEST_CASE("surfaces that cross are seen, counted and parted", "[contact]") {
   const long counted = contact.report().crossings;
   contact.look(11, dt);
   CHECK(contact.report().crossings == counted);
+  move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 1.0 : 0.0}; });
+  CHECK_THROWS_WITH(contact.look(12, dt), Catch::Contains("surfaces cross: cells.") && Catch::Contains("um at 12 us") &&
+                                              Catch::Contains("time.step_us"));
   CHECK_THROWS_AS(
       [&] {
         move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 0.3 : 0.0}; });
@@ -263,7 +266,10 @@ TEST_CASE("no move takes more than half of a gap away", "[contact]") {
     return p - Vec3{0, 0, body == 1 ? way : 0.0} + 0.01 * noise.vector();
   });
   const auto moved = on_host(set.x);
-  contact.limit_approach();
+  contact.limit_approach(0);
+  CHECK((contact.report().limited > 0) == (way > 0.02));
+  CHECK((contact.report().crossings > 0) == (way > 0.1));
+  const long counted = contact.report().crossings;
   const auto kept = on_host(set.x);
   double most = 0;
   Vec3 sum;
@@ -272,7 +278,7 @@ TEST_CASE("no move takes more than half of a gap away", "[contact]") {
   if (way < 0.02) CHECK(most == 0);
   CHECK(norm(sum) < 1e-12);  // equal and opposite
   contact.look(0, dt);
-  CHECK(contact.report().crossings == 0);
+  CHECK(contact.report().crossings == counted);
   const auto after = on_host(contact.gaps());
   for (int v = 0; v < set.vertices; ++v)
     if (before[v] < 0.2)

@@ -90,6 +90,26 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
   CHECK(*energy.imbalance() < s.balance);
 }
 
+TEST_CASE("cells that cross in a run are put back and counted, and the run goes on", "[coupling][contact]") {
+  Timers timers;
+  FlowSimulation simulation(Comm(), pressed_cells(0.15, 0.2, 20, 400), timers);
+  const auto coupling = simulation.coupling();
+  simulation.step();
+  CHECK(coupling->contact_report()->crossings == 0);
+  // As if a step had gone wrong: the second cell a little into the first.
+  const auto& set = *simulation.surfaces();
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.x);
+  for (int v = set.vertices / 2; v < set.vertices; ++v) x(v, 2) -= 0.25;
+  Kokkos::deep_copy(set.x, x);
+  simulation.step();
+  const long crossings = coupling->contact_report()->crossings;
+  CHECK(crossings > 0);
+  while (!simulation.done()) simulation.step();
+  CHECK(coupling->contact_report()->crossings == crossings);
+  for (const auto& cell : simulation.membranes()->diagnostics())
+    CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-3));
+}
+
 TEST_CASE("cells at rest that do not touch stay as if there were no contact", "[coupling][contact]") {
   Case with = pressed_cells(0.6, 0, 20, 200), without = with;
   without.contact.reset();

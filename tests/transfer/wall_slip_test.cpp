@@ -11,58 +11,74 @@ using namespace corpuscle::fluid_test;
 
 namespace {
 
-/// Mean speed of a plate of markers along a wall, for a force per area of viscosity over spacing; between walls eight
-/// spacings apart, the plate `gap` spacings from one of them.
+constexpr int n = 4, high = 8;                       // cells along and across, of 1 um
+constexpr int along = 2 * n, count = along * along;  // markers
+
+/// A plate of markers between walls, `gap` from one of them.
+struct Plate {
+  Plate(double gap, const Vec3& normal_of, const Vec3& force_per_area)
+      : boundaries(sides({Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic})),
+        grid(Comm(), make_node_source(nodes()), {true, false, true}),
+        transfer(grid, boundaries, CouplingSettings::Kernel::three_point, count) {
+    set.vertices = count;
+    set.x = Components<double>("corpuscle::test::x", count, 3);
+    set.normal = Components<double>("corpuscle::test::normal", count, 3);
+    set.area = Array<double>("corpuscle::test::area", count);
+    force = Components<double>("corpuscle::test::force", count, 3);
+    velocity = Components<double>("corpuscle::test::velocity", count, 3);
+    const auto x = Kokkos::create_mirror_view(set.x), normal = Kokkos::create_mirror_view(set.normal),
+               f = Kokkos::create_mirror_view(force);
+    for (int v = 0; v < count; ++v) {
+      store(x, v, Vec3{0.13 + 0.5 * (v % along), gap, 0.07 + 0.5 * (v / along)});
+      store(normal, v, normal_of);
+      store(f, v, 0.25 * force_per_area);
+    }
+    Kokkos::deep_copy(set.x, x);
+    Kokkos::deep_copy(set.normal, normal);
+    Kokkos::deep_copy(set.area, 0.25);
+    Kokkos::deep_copy(force, f);
+    REQUIRE(transfer.place(set.x) == -1);
+  }
+  static GridSettings nodes() {
+    auto settings = box({n, high, n}, {n, high, n});
+    settings.lower_um = {0, 0, 0}, settings.upper_um = {n, high, n};
+    return settings;
+  }
+  Vec3 mean(const Array<double> (&flux)[3], const Components<double>& u, double viscosity, bool slip) {
+    const SlipViews correction = transfer.slip(set, force, viscosity);
+    transfer.interpolate(flux, u, slip ? &correction : nullptr, velocity);
+    const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), velocity);
+    Vec3 sum;
+    for (int i = 0; i < count; ++i) sum += (1.0 / count) * load(v, i);
+    return sum;
+  }
+
+  std::vector<BoundarySettings> boundaries;
+  Grid grid;
+  Transfer transfer;
+  SurfaceSet set;
+  Components<double> force, velocity;
+};
+
+/// Mean speed of a plate along a wall, for a force per area of viscosity over spacing.
 struct PlateSpeeds {
   double without, with, exact;
 };
 PlateSpeeds plate_speeds(double gap) {
-  constexpr int n = 4, high = 8;
-  const auto boundaries =
-      sides({Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic});
-  auto nodes = box({n, high, n}, {n, high, n});
-  nodes.lower_um = {0, 0, 0}, nodes.upper_um = {n, high, n};
-  Grid grid(Comm(), make_node_source(nodes), {true, false, true});
   FluidSettings settings;
   settings.convection = FluidSettings::Convection::none;
   settings.momentum_tolerance = settings.divergence_tolerance = 1e-10;
-  FluidSolver fluid(grid, settings, boundaries);
-  constexpr int along = 2 * n, count = along * along;
-  Transfer transfer(grid, boundaries, CouplingSettings::Kernel::three_point, count);
-  fluid.set_face_force(transfer.faces());
+  Plate plate(gap, {0, 1, 0}, {settings.kinematic_viscosity_um2_per_us, 0, 0});
+  FluidSolver fluid(plate.grid, settings, plate.boundaries);
+  fluid.set_face_force(plate.transfer.faces());
   fluid.raise_reference_speed(1);
-  SurfaceSet set;
-  set.vertices = count;
-  set.x = Components<double>("corpuscle::test::x", count, 3);
-  set.normal = Components<double>("corpuscle::test::normal", count, 3);
-  set.area = Array<double>("corpuscle::test::area", count);
-  const Components<double> force("corpuscle::test::force", count, 3), velocity("corpuscle::test::velocity", count, 3);
-  const auto x = Kokkos::create_mirror_view(set.x), normal = Kokkos::create_mirror_view(set.normal),
-             f = Kokkos::create_mirror_view(force);
-  for (int v = 0; v < count; ++v) {
-    store(x, v, Vec3{0.13 + 0.5 * (v % along), gap, 0.07 + 0.5 * (v / along)});
-    store(normal, v, Vec3{0, 1, 0});
-    store(f, v, Vec3{0.25 * fluid.viscosity(), 0, 0});
-  }
-  Kokkos::deep_copy(set.x, x);
-  Kokkos::deep_copy(set.normal, normal);
-  Kokkos::deep_copy(set.area, 0.25);
-  Kokkos::deep_copy(force, f);
-  REQUIRE(transfer.place(set.x) == -1);
-  transfer.spread(force);
+  plate.transfer.spread(plate.force);
   for (int s = 0; s < 6; ++s) {
     fluid.begin_step(1e4);
     fluid.solve(1e4 * (s + 1), nullptr);
   }
-  const auto mean = [&](bool slip) {
-    const SlipViews correction = transfer.slip(set, force, fluid.viscosity());
-    transfer.interpolate(fluid.flux(), fluid.velocity(), slip ? &correction : nullptr, velocity);
-    const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), velocity);
-    double sum = 0;
-    for (int i = 0; i < count; ++i) sum += v(i, 0) / count;
-    return sum;
-  };
-  return {mean(false), mean(true), gap * (high - gap) / high};
+  return {plate.mean(fluid.flux(), fluid.velocity(), fluid.viscosity(), false).x,
+          plate.mean(fluid.flux(), fluid.velocity(), fluid.viscosity(), true).x, gap * (high - gap) / high};
 }
 
 }  // namespace
@@ -77,5 +93,21 @@ TEST_CASE("the slip correction is right beside a wall, down to no gap", "[transf
     INFO("gap " << gap << " h");
     CHECK(std::abs(speed.with - speed.exact) < 0.025);  // of 0.25 to 0.28, which depends on the place between the nodes
     if (gap >= 0.5) CHECK(speed.without - speed.exact < -0.2);
+  }
+}
+
+TEST_CASE("slip carries no membrane through a wall", "[transfer]") {
+  // Inclined to the wall, its slip has a part across it.
+  for (double gap : {0.2, 0.5, 1.0, 2.5}) {
+    Plate plate(gap, {0, std::sqrt(0.5), std::sqrt(0.5)}, {0, -1, 1});
+    Array<double> flux[3];
+    for (auto& through : flux) through = Array<double>("corpuscle::test::flux", plate.grid.index().size());
+    const Components<double> u("corpuscle::test::u", plate.grid.index().size(), 3);
+    const Vec3 v = plate.mean(flux, u, 1, true);
+    INFO("gap " << gap << " h");
+    const double rounding = 1e-12 * norm(v);
+    CHECK(v.y < rounding);
+    CHECK((v.y > -rounding) == (gap <= 0.5));
+    if (gap > 1.5) CHECK(v.y == Approx(-v.z));
   }
 }
