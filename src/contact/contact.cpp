@@ -12,6 +12,7 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "immersed/surface.hpp"
+#include "membrane/interface.hpp"
 #include "parallel/agree.hpp"
 
 namespace corpuscle {
@@ -123,7 +124,7 @@ void Contact::make_lists(double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
   if (surface_.vertices == 0) return;  // on this rank, at present
   if (skin_ >= 0 && largest_way(surface_, listed_, dt) < 0.5 * skin_) return;
-  Kokkos::deep_copy(Exec(), listed_, surface_.x);
+  copy_vertices(surface_.vertices, surface_.x, listed_);
   const double way = largest_way(surface_, listed_, dt);
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
@@ -290,7 +291,8 @@ double Contact::fastest_relaxation_per_us() const {
 }
 
 void Contact::add_forces(double dt, bool ahead, const Components<double>& force) {
-  if (ahead && ahead_.item.extent(0) < now_.item.extent(0)) ahead_ = make_contacts(&now_);
+  const bool made = ahead_.hit_start.data() && ahead_.item.extent(0) >= now_.item.extent(0);
+  if (ahead && !made) ahead_ = make_contacts(&now_);
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
   contact_forces(surface_, law(dt), rest_, lists_, contacts);
