@@ -1,6 +1,8 @@
 // Which triangles may touch which vertices, found through bins.
 #pragma once
 
+#include <string>
+
 #include "contact/contact_views.hpp"
 #include "contact/triangle_bins.hpp"
 #include "immersed/triangle.hpp"
@@ -76,6 +78,21 @@ struct ContactSearch {
   }
 };
 
+/// From numbers to the first of each vertex, in place, over [vertex + 1]. @returns their sum
+inline int numbers_to_starts(const std::string& label, const Array<int>& numbers, int vertices) {
+  const auto first = numbers;
+  int total = 0;
+  Kokkos::parallel_scan(
+      label, Policy(0, vertices + 1),
+      KOKKOS_LAMBDA(int v, int& sum, bool last) {
+        const int own = v < vertices ? first(v) : 0;
+        if (last) first(v) = sum;
+        sum += own;
+      },
+      total);
+  return total;
+}
+
 /// lists.first, and how many items there are.
 inline int count_items(const ContactSearch& search, const ContactLists& lists) {
   const ContactSearch s = search;
@@ -87,16 +104,7 @@ inline int count_items(const ContactSearch& search, const ContactLists& lists) {
         s.visit(v, [&](int) { ++count; });
         first(v) = count;
       });
-  int total = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::contact::first_items", Policy(0, vertices + 1),
-      KOKKOS_LAMBDA(int v, int& sum, bool last) {
-        const int own = v < vertices ? first(v) : 0;
-        if (last) first(v) = sum;
-        sum += own;
-      },
-      total);
-  return total;
+  return numbers_to_starts("corpuscle::contact::first_items", first, vertices);
 }
 
 /// lists.item, in order, and how many groups each vertex has, in first_group.
@@ -121,17 +129,7 @@ inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
 
 /// From numbers to first_group. @returns how many groups there are
 inline int number_groups(const ContactLists& lists, int vertices) {
-  const auto first = lists.first_group;
-  int total = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::contact::first_groups", Policy(0, vertices + 1),
-      KOKKOS_LAMBDA(int v, int& sum, bool last) {
-        const int own = v < vertices ? first(v) : 0;
-        if (last) first(v) = sum;
-        sum += own;
-      },
-      total);
-  return total;
+  return numbers_to_starts("corpuscle::contact::first_groups", lists.first_group, vertices);
 }
 
 }  // namespace corpuscle

@@ -74,8 +74,7 @@ inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_
   return all;
 }
 
-/// Side on which a vertex saw its own body last: item * 2 + 1 outside, item * 2 inside; -1 where nothing was within
-/// reach.
+/// Whether two triangles share a vertex.
 KOKKOS_INLINE_FUNCTION bool adjacent(const SurfaceSet& s, int t, int other) {
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b)
@@ -103,7 +102,8 @@ struct CrossingCount {
 
 /// Contacts on the wrong side: inside another body, or beyond the own surface where the vertex was on the other side of
 /// the same place when it was last looked at; those are turned round, so that their gap is negative as well.
-/// @param side   [vertex] of the own body, kept from call to call
+/// @param side  [vertex] on which it saw its own body last, kept from call to call: triangle * 2 + 1 outside, triangle * 2 inside;
+///              -1 where nothing was within reach
 /// @param counted  of the first so many vertices crossings count
 inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
                                     const Array<int>& side, int counted) {

@@ -32,6 +32,8 @@ inline SurfaceStress make_surface_stress(const std::string& label, int vertices)
 /// Stands for the pressure of a vertex that no fluid node informs. Zero would be a pressure, at whose level the vertex
 /// would be pushed or pulled.
 constexpr double no_pressure = 1e300;
+/// The same in a film, to another body, that has no fluid nodes.
+constexpr double unseen_pressure = 2 * no_pressure;
 KOKKOS_INLINE_FUNCTION bool has_pressure(double p) { return !(p >= 0.5 * no_pressure); }
 
 /// Force of the pressure on vertex i, nN: minus its integral times the outward normal and the function that falls
@@ -60,7 +62,7 @@ KOKKOS_INLINE_FUNCTION Vec3 fluid_force(const SurfaceSet& s, const SurfaceStress
 
 /// Fills the pressures that are missing in `found` with the mean over the neighbours that have one, or else over the body:
 /// the level enters as it does elsewhere. traction = -p n + viscous part, [vertex, 3] kPa.
-/// @returns the lowest vertex without a neighbour that has one, or no_vertex: its load is a guess
+/// @returns the lowest vertex of unseen_pressure without a neighbour that has one, or no_vertex: its load is a guess
 inline int complete_stress(const SurfaceSet& surface, const SurfaceStress& found, const SurfaceStress& stress,
                            const Components<double>& traction) {
   using Team = Kokkos::TeamPolicy<Exec>;
@@ -93,7 +95,7 @@ inline int complete_stress(const SurfaceSet& surface, const SurfaceStress& found
                   if (has_pressure(q)) sum += q, ++neighbours;
                 }
                 p = neighbours > 0 ? sum / neighbours : mean;
-                if (neighbours == 0 && i < least) least = i;
+                if (neighbours == 0 && in.pressure(i) > 1.5 * no_pressure && i < least) least = i;
               }
               out.set(i, p, in.viscous(i));
               store(total, i, in.viscous(i) - p * load(s.normal, i));

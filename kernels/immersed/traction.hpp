@@ -207,7 +207,7 @@ KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<
   int how = pressure_fitted;
   const bool fitted = fit_pressure(in, p, t, fit_radius, fit);
   if (fit.fluid == 0 && another_near(in, t)) {  // in a film without fluid nodes: pressures at its rim are not its own
-    value = no_pressure;
+    value = unseen_pressure;
     return pressure_nothing;
   }
   if (!fitted) {

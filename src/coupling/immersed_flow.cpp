@@ -252,6 +252,11 @@ const SurfaceStress& ImmersedFlow::tractions() {
   return stress_;
 }
 
+void ImmersedFlow::forget_tractions() {
+  Kokkos::deep_copy(stress_.values, 0.0);
+  Kokkos::deep_copy(traction_, 0.0);
+}
+
 std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>& centre) {
   Components<double> at("corpuscle::immersed::centre", surfaces_.bodies, 3);
   Components<double> loads("corpuscle::immersed::loads", surfaces_.bodies, 6);

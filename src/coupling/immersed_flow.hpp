@@ -51,6 +51,9 @@ class ImmersedFlow {
   int unseen_vertex() const { return unseen_vertex_; }
   std::string vertex_text(int vertex) const { return boundary_->describe_vertex(vertex); }
 
+  /// As before the first step: tractions() only to see whether it can tell them leaves none.
+  void forget_tractions();
+
   /// The last of these, zero before the first, and as tractions -p n + viscous part, [vertex, 3] kPa.
   const SurfaceStress& last_stress() const { return stress_; }
   const Components<double>& last_tractions() const { return traction_; }

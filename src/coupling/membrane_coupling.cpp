@@ -61,6 +61,7 @@ void MembraneCoupling::check_start() {
   }
   try {
     load();
+    immersed_->forget_tractions();
     membranes_->stable_step_us();
     membranes_->substeps(scene_.time.step_us, stability(scene_.time.step_us)->beta);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
