@@ -38,8 +38,9 @@ struct Shortfall {
 
 /// push: the way by which vertex and corners must move for the gap, along the normal as it was found, to be at least
 /// the goal.
+/// @param counted  of the first so many vertices contacts count
 inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
-                                 const ContactViews& contacts, const GapGoal& gap_goal, double range) {
+                                 const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const GapGoal goal = gap_goal;
@@ -64,8 +65,8 @@ inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_
           c.push(g) = goal.relax * (wanted - now) / mobility;
           Shortfall own;
           own.most = (wanted - now) / wanted;
-          own.limited = 1;
-          if (now < 0) own.through = 1, own.first = g;
+          if (v < counted) own.limited = 1;
+          if (v < counted && now < 0) own.through = 1, own.first = g;
           sum += own;
         }
       },
@@ -103,8 +104,9 @@ struct CrossingCount {
 /// the same place when it was last looked at; those are turned round, so that their gap is negative as well.
 /// @param side  [vertex] on which it saw its own body last, kept from call to call: triangle * 2 + 1 outside, triangle * 2 inside;
 ///              -1 where nothing was within reach
+/// @param counted  of the first so many vertices crossings count
 inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
-                                    const Array<int>& side) {
+                                    const Array<int>& side, int counted) {
   const SurfaceSet s = surface;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
@@ -127,7 +129,7 @@ inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactList
               for (int d = 0; d < 3; ++d) c.normal(g, d) = -c.normal(g, d);
             }
           }
-          if (c.gap(g) < 0) {
+          if (c.gap(g) < 0 && v < counted) {
             CrossingCount own;
             own.vertices = 1;
             own.first = g;

@@ -104,14 +104,17 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const Slip
   return share * fade_at_sides(block, eta, along, slip_motion(slip.law, along, n, tangential));
 }
 
-/// Adds the slip to the velocity of markers that are at home.
-inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers) {
+/// Adds the slip to the velocity [vertex, 3] of vertices whose marker is at home.
+inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers,
+                     const Components<double>& velocity) {
   const TransferBlock block = transfer_block;
+  const auto of_vertex = velocity;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   Kokkos::parallel_for(
       "corpuscle::transfer::add_slip", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        if (m.home(marker)) store(m.velocity, marker, load(m.velocity, marker) + slip_velocity(block, s, m, marker));
+        const int v = m.vertex(marker);
+        if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(block, s, m, marker));
       });
 }
 

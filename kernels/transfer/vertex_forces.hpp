@@ -35,16 +35,17 @@ inline double power_of_pushes(int count, const Array<int>& vertex_body, const Ta
   return power;
 }
 
-/// sum += the first three of four columns; returns the total of the fourth.
-inline double add_first_three(int count, const Components<double>& four, const Components<double>& sum) {
+/// sum += the first three of four columns.
+inline void add_first_three(int count, const Components<double>& four, const Components<double>& sum) {
+  Kokkos::parallel_for(
+      "corpuscle::transfer::add_first_three", Policy(0, count),
+      KOKKOS_LAMBDA(int i) { store(sum, i, load(sum, i) + load(four, i)); });
+}
+
+inline double sum_of_fourth(int count, const Components<double>& four) {
   double total = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::transfer::add_first_three", Policy(0, count),
-      KOKKOS_LAMBDA(int i, double& last) {
-        store(sum, i, load(sum, i) + load(four, i));
-        last += four(i, 3);
-      },
-      total);
+      "corpuscle::transfer::sum_of_fourth", Policy(0, count), KOKKOS_LAMBDA(int i, double& sum) { sum += four(i, 3); }, total);
   return total;
 }
 

@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cells/topology.hpp"
 #include "contact/contact_pushes.hpp"
 #include "contact/find_contacts.hpp"
 #include "contact/keep_apart.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "immersed/surface.hpp"
+#include "membrane/interface.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
@@ -39,25 +42,42 @@ int last_value(const Array<int>& view, int at) {
 }  // namespace
 
 Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
-                 double blend_um)
+                 double blend_um, const ContactPeers* peers)
     : settings_(settings), surface_(surfaces), images_(images), viscosity_(viscosity) {
+  if (peers) peers_ = *peers;
   constexpr double apart = 1.5;  // of the range: a sheet that is compressed by a third does not repel itself
   reach_.own = settings.range_um;
   reach_.other =
       std::max({settings.range_um, blend_um, settings.aggregation_energy > 0 ? settings.aggregation_range_um : 0.0});
   reach_.apart = apart * settings.range_um;
-  const int vertices = surfaces.vertices;
-  rest_ = {make<Components<double>>("rest_x", vertices, 3), make<Array<double>>("rest_area", vertices)};
+  make_arrays();
+  if (peers) return;  // take_up() follows
   Kokkos::deep_copy(rest_.x, surfaces.x);
   Kokkos::deep_copy(rest_.area, surfaces.area);
-  movable_ = last_value(surfaces.first_vertex, surfaces.cells);
+}
+
+void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type) {
+  surface_ = set;
+  make_arrays();
+  fill_rest(types, type, surface_, rest_.x, rest_.area);
+}
+
+/// For the present surfaces, of whose contacts nothing is known.
+void Contact::make_arrays() {
+  const int vertices = surface_.vertices;
+  rest_ = {make<Components<double>>("rest_x", vertices, 3), make<Array<double>>("rest_area", vertices)};
+  movable_ = last_value(surface_.first_vertex, surface_.cells);
+  own_ = peers_ ? surface_.own_vertices : movable_;
   lists_.first = make<Array<int>>("first_item", vertices + 1);
   lists_.first_group = make<Array<int>>("first_contact", vertices + 1);
   listed_ = make<Components<double>>("listed_x", vertices, 3);
   side_ = make<Array<int>>("own_side", vertices);
   Kokkos::deep_copy(side_, -1);
   gap_ = make<Array<double>>("gap", vertices);
-  bins_.order = make<Array<int>>("bin_order", surfaces.triangles);
+  bins_.order = make<Array<int>>("bin_order", surface_.triangles);
+  now_ = ahead_ = {};
+  lists_.items = lists_.groups = item_room_ = group_room_ = 0;
+  skin_ = -1;
 }
 
 void Contact::make_bins(double width) {
@@ -102,8 +122,9 @@ ContactViews Contact::make_contacts(const ContactViews* shares) const {
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
 void Contact::make_lists(double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
+  if (surface_.vertices == 0) return;  // on this rank, at present
   if (skin_ >= 0 && largest_way(surface_, listed_, dt) < 0.5 * skin_) return;
-  Kokkos::deep_copy(Exec(), listed_, surface_.x);
+  copy_vertices(surface_.vertices, surface_.x, listed_);
   const double way = largest_way(surface_, listed_, dt);
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
@@ -134,13 +155,20 @@ Shortfall Contact::correct(double share, double least) {
   const GapGoal goal{share, least, relax, movable_};
   Shortfall before;
   for (int pass = 0; pass < most_passes; ++pass) {
-    const Shortfall now = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um);
+    const Shortfall now = shortfall(goal);
     if (pass == 0) before = now;
     if (now.most <= enough) break;
-    sort_hits(surface_, lists_.groups, now_);
-    add_pushes(surface_, lists_, now_, movable_, surface_.x);
+    push(now_, surface_.x);
+    if (peers_) peers_->update_copies();
   }
   return before;
+}
+
+/// Adds the contacts' pushes to `sum` [vertex, 3] of this rank's own.
+void Contact::push(const ContactViews& contacts, const Components<double>& sum) {
+  if (surface_.vertices == 0) return;
+  sort_hits(surface_, lists_.groups, contacts);
+  add_pushes(surface_, lists_, contacts, own_, sum);
 }
 
 void Contact::limit_ahead() { correct(keep_share, 0); }
@@ -151,9 +179,19 @@ void Contact::limit_approach(double time) {
   if (before.through > 0) count_crossings(before.through, before.first, time);
 }
 
+/// Of all ranks together, but for the contact that is named.
+Shortfall Contact::shortfall(const GapGoal& goal) {
+  Shortfall found = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um, own_);
+  if (!peers_) return found;
+  found.most = peers_->comm.max(found.most);
+  found.limited = static_cast<int>(peers_->comm.sum(static_cast<long>(found.limited)));
+  found.through = static_cast<int>(peers_->comm.sum(static_cast<long>(found.through)));
+  return found;
+}
+
 void Contact::count_crossings(int vertices, int first, double time) {
   if (report_.crossings < told)
-    warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", crossing_text(first), time, vertices);
+    warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
   report_.crossings += vertices;
 }
 
@@ -169,15 +207,31 @@ std::string Contact::crossing_text(int contact) const {
   const std::string where = fmt::format("({:.4g}, {:.4g}, {:.4g}) um", x(v, 0), x(v, 1), x(v, 2));
   if (item_image(surface_, item) == 0 && body(v) == other)
     return fmt::format("{} with itself at {}", body_name(surface_, other), where);
+  const bool image = body_name(surface_, body(v)) == body_name(surface_, other);
   return fmt::format("{} and {}{} at {}", body_name(surface_, body(v)), body_name(surface_, other),
-                     body(v) == other ? " beyond a periodic side" : "", where);
+                     image ? " beyond a periodic side" : "", where);
+}
+
+/// Of all ranks together, but for the contact that is named.
+CrossingCount Contact::crossings() {
+  CrossingCount found = find_crossings(surface_, lists_, now_, side_, own_);
+  if (!peers_) return found;
+  found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
+  found.deepest = peers_->comm.max(found.deepest);
+  return found;
+}
+
+/// On all ranks, of the lowest rank that has one.
+std::string Contact::told_text(int first) const {
+  const std::string mine = first < lists_.groups ? crossing_text(first) : "";
+  return peers_ ? agree(peers_->comm, mine) : mine;
 }
 
 /// Finds crossings and puts what has crossed back, as often as it takes.
 /// @throws ComputationError  if some is not to be put back: what has gone in far has no way that is its own
 void Contact::mend_crossings(double time) {
   for (int repair = 0; repair <= most_repairs; ++repair) {
-    const CrossingCount found = find_crossings(surface_, lists_, now_, side_);
+    const CrossingCount found = crossings();
     if (found.vertices == 0) return;
     if (repair == most_repairs || found.deepest > deepest_share * settings_.range_um)
       throw ComputationError(fmt::format(
@@ -185,7 +239,7 @@ void Contact::mend_crossings(double time) {
           "cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise contact.pressure_Pa "
           "or "
           "contact.range_um, or reduce the load",
-          crossing_text(found.first), time, found.vertices, found.deepest));
+          told_text(found.first), time, found.vertices, found.deepest));
     if (repair == 0) count_crossings(found.vertices, found.first, time);
     correct(0, healed_share * settings_.range_um);
     find(now_);
@@ -196,18 +250,23 @@ void Contact::look(double time, double dt) {
   make_lists(dt);
   find(now_);
   mend_crossings(time);
-  report_.smallest_gap = std::min(report_.smallest_gap, least_of(gap_));
+  report_.smallest_gap = std::min(report_.smallest_gap, smallest_gap());
+}
+
+double Contact::smallest_gap() const {
+  const double here = least_of(gap_);
+  return peers_ ? peers_->comm.min(here) : here;
 }
 
 void Contact::look_at_start(double dt) {
   make_lists(dt);
   find(now_);
-  const auto found = find_crossings(surface_, lists_, now_, side_);
+  const auto found = crossings();
   if (found.vertices > 0)
     throw InputError(
         fmt::format("surfaces cross: {}, by {} vertices, before the first step: move them apart (center_um, axis)",
-                    crossing_text(found.first), found.vertices));
-  report_.smallest_gap = least_of(gap_);
+                    told_text(found.first), found.vertices));
+  report_.smallest_gap = smallest_gap();
 }
 
 ContactLaw Contact::law(double dt) const {
@@ -237,10 +296,13 @@ void Contact::add_forces(double dt, bool ahead, const Components<double>& force)
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
   contact_forces(surface_, law(dt), rest_, lists_, contacts);
-  sort_hits(surface_, lists_.groups, contacts);
-  add_pushes(surface_, lists_, contacts, movable_, force);
+  push(contacts, force);
 }
 
-double Contact::energy(double dt) const { return contact_energy(surface_, law(dt), rest_, lists_, now_); }
+double Contact::energy(double dt) const {
+  const int vertices = peers_ ? own_ : surface_.vertices;
+  const double here = contact_energy(surface_, law(dt), rest_, lists_, now_, vertices);
+  return peers_ ? peers_->comm.sum(here) : here;
+}
 
 }  // namespace corpuscle

@@ -2,16 +2,27 @@
 // and undone.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 
 #include "contact/contact_law.hpp"
 #include "contact/contact_report.hpp"
 #include "contact/contact_views.hpp"
+#include "contact/keep_apart.hpp"
 #include "contact/triangle_bins.hpp"
 #include "input/case.hpp"
+#include "parallel/comm.hpp"
 
 namespace corpuscle {
 
+/// The other ranks, where cells are shared out. Every rank makes the same calls.
+struct ContactPeers {
+  Comm comm;
+  std::function<void()> update_copies;  // positions of this rank's cells to all their copies
+};
+
+struct GapGoal;
 struct Shortfall;
 
 class Contact {
@@ -21,7 +32,11 @@ class Contact {
   /// @param viscosity  mPa s, of the fluid between them
   /// @param blend_um  up to this gap to other bodies gaps() are wanted; 0 for none
   Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
-          double blend_um);
+          double blend_um, const ContactPeers* peers = nullptr);
+
+  /// The surfaces are others from now on: those of `set`, of the types of cells in `types`. look() must follow.
+  /// @param type  [body] of set
+  void take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type);
 
   /// What is near what at the surfaces' present positions. Crossings are counted, told and undone.
   /// @param dt  of the next step, us
@@ -47,7 +62,7 @@ class Contact {
 
   /// [vertex] um to the nearest other body, of look() or add_forces(), whichever was last; large where nothing is near.
   const Array<double>& gaps() const { return gap_; }
-  /// Energy of the contacts that look() saw, fJ.
+  /// Energy of the contacts that look() saw, fJ, of all ranks.
   double energy(double dt) const;
   const Array<double>& rest_area() const { return rest_.area; }
   const ContactReport& report() const { return report_; }
@@ -57,6 +72,12 @@ class Contact {
   const ContactViews& contacts() const { return now_; }
 
  private:
+  void make_arrays();
+  void push(const ContactViews& contacts, const Components<double>& sum);
+  CrossingCount crossings();
+  double smallest_gap() const;
+  Shortfall shortfall(const GapGoal& goal);
+  std::string told_text(int first) const;
   void make_lists(double dt);
   void make_bins(double width);
   ContactViews make_contacts(const ContactViews* shares) const;
@@ -81,7 +102,9 @@ class Contact {
   double skin_ = -1;           // um; negative before there are lists
   Array<int> side_;            // [vertex]
   Array<double> gap_;          // [vertex]
-  int movable_;                // vertices of cells
+  int movable_ = 0;            // vertices of cells
+  int own_ = 0;                // of those of this rank
+  std::optional<ContactPeers> peers_;
   ContactReport report_;
 };
 

@@ -20,40 +20,39 @@ WallSides walls_of(const Case& scene) {
   return walls;
 }
 
-Images images_of(const PeriodImages& periods) {
-  Images images;
-  images.count = periods.count;
-  for (int m = 0; m < periods.count; ++m) images.shift[m] = periods.shift[m];
-  return images;
-}
-
 }  // namespace
 
 bool CellLoads::wanted(const Case& scene) {
   return scene.contact || std::any_of(scene.cells.begin(), scene.cells.end(), pushed);
 }
 
-CellLoads::CellLoads(const Case& scene, const Comm& comm, const Membranes& membranes, const Transfer& transfer,
-                     double viscosity)
-    : comm_(comm), membranes_(membranes), transfer_(transfer) {
-  const int vertices = membranes.vertices();
-  force_ = Components<double>("corpuscle::coupling::load", vertices, 3);
+CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity)
+    : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer) {
   if (scene.contact) {
-    const double blend = scene.coupling->slip ? slip_reach * comm.max(transfer.largest_spacing()) : 0;
-    contact_ =
-        std::make_unique<Contact>(*scene.contact, membranes.surfaces(), images_of(transfer.images()), viscosity, blend);
+    const double blend = scene.coupling->slip ? slip_reach * comm_.max(transfer.largest_spacing()) : 0;
+    const ContactPeers peers{comm_, [&cells] { cells.to_copies(cells.surfaces().x, true); }};
+    contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
     walls_ = walls_of(scene);
   }
-  if (walls_.any()) {
-    wall_ = Components<double>("corpuscle::contact::wall_load", vertices, 4);
-    if (comm.size() > 1) wall_host_ = HostCopy(wall_);
-  }
-  if (std::none_of(scene.cells.begin(), scene.cells.end(), pushed)) return;
-  share_ = Table<double>("corpuscle::coupling::push_share", membranes.cells(), 3);
+  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+    if (pushed(scene.cells[c])) push_[static_cast<int>(c)] = scene.cells[c].push_nN;
+  take_up();
+}
+
+void CellLoads::take_up() {
+  const SurfaceSet& set = membranes_.surfaces();
+  force_ = Components<double>("corpuscle::coupling::load", set.vertices, 3);
+  if (contact_) contact_->take_up(set, membranes_.templates(), membranes_.views().type);
+  if (walls_.any()) wall_ = Components<double>("corpuscle::contact::wall_load", set.vertices, 4);
+  if (push_.empty()) return;
+  share_ = Table<double>("corpuscle::coupling::push_share", membranes_.cells() + 1, 3);
   const auto share = Kokkos::create_mirror_view(share_);
-  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), membranes.surfaces().first_vertex);
-  for (int c = 0; c < membranes.cells(); ++c)
-    for (int d = 0; d < 3; ++d) share(c, d) = scene.cells[c].push_nN[d] / (first(c + 1) - first(c));
+  for (std::size_t c = 0; c < cells_.own().size(); ++c) {
+    const auto push = push_.find(cells_.own()[c].number);
+    if (push == push_.end()) continue;
+    const auto vertices = static_cast<double>(membranes_.types()[cells_.own()[c].type].mesh.vertices.size());
+    for (int d = 0; d < 3; ++d) share(c, d) = push->second[d] / vertices;
+  }
   Kokkos::deep_copy(share_, share);
 }
 
@@ -80,20 +79,18 @@ void CellLoads::gather(double dt, bool ahead) {
   if (walls_.any()) add_walls(dt);
 }
 
-/// Each rank knows the walls of its own block; the others' parts are zero.
+/// Each rank knows the walls of its own block; its copies' parts go to their cells.
 void CellLoads::add_walls(double dt) {
   wall_forces(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt), contact_->rest_area(), wall_);
-  if (comm_.size() > 1) {
-    comm_.sum(wall_host_.read().data(), static_cast<int>(wall_.span()));
-    wall_host_.write();
-  }
-  wall_energy_ = add_first_three(membranes_.vertices(), wall_, force_);
+  wall_energy_ = comm_.sum(sum_of_fourth(membranes_.surfaces().vertices, wall_));
+  cells_.add_copies(wall_);
+  add_first_three(membranes_.vertices(), wall_, force_);
 }
 
 double CellLoads::power_of_pushes() const {
   if (share_.extent(0) == 0) return 0;
   const auto& set = membranes_.surfaces();
-  return corpuscle::power_of_pushes(membranes_.vertices(), set.vertex_body, share_, set.v);
+  return comm_.sum(corpuscle::power_of_pushes(membranes_.vertices(), set.vertex_body, share_, set.v));
 }
 
 double CellLoads::contact_energy(double dt) const { return contact_ ? contact_->energy(dt) + wall_energy_ : 0; }

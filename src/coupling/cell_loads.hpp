@@ -1,12 +1,12 @@
 // What acts on membranes besides their own forces: contact, walls, and pushes from outside.
 #pragma once
 
+#include <map>
 #include <optional>
 
 #include "contact/contact.hpp"
 #include "contact/wall_contact.hpp"
-#include "membrane/membranes.hpp"
-#include "parallel/comm.hpp"
+#include "cells/shared_cells.hpp"
 #include "transfer/transfer.hpp"
 
 namespace corpuscle {
@@ -14,11 +14,12 @@ namespace corpuscle {
 class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
-  CellLoads(const Case& scene, const Comm& comm, const Membranes& membranes, const Transfer& transfer,
-            double viscosity);
+  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
 
+  /// The cells at hand are others from now on. look() must follow, with valid copies.
+  void take_up();
   /// @throws InputError  if cells cross where they start
   void look_at_start(double dt_us);
   /// After a step's move: who is near whom for the next one of that length. Crossings are told and undone.
@@ -47,16 +48,17 @@ class CellLoads {
  private:
   void add_walls(double dt_us);
 
-  const Comm comm_;
+  SharedCells& cells_;
   const Membranes& membranes_;
+  const Comm comm_;
   const Transfer& transfer_;
   std::unique_ptr<Contact> contact_;  // only with [contact]
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
   Components<double> wall_;   // [vertex, 4] nN, fJ; only with walls
-  HostCopy<Components<double>> wall_host_;
-  double wall_energy_ = 0;  // fJ
-  Table<double> share_;     // [cell, 3] nN; only if any is pushed
+  double wall_energy_ = 0;      // fJ
+  std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
+  Table<double> share_;         // [own cell, 3] nN; only if any is pushed
 };
 
 }  // namespace corpuscle

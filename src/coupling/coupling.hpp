@@ -28,6 +28,8 @@ struct StepStatistics {
   double coupling_residual = 0;  // change of the interface velocity that one more iteration would make, relative
 };
 
+class SharedCells;
+
 class Coupling {
  public:
   virtual ~Coupling() = default;
@@ -64,7 +66,7 @@ class Coupling {
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
 
-  /// How far each body has been moved back by whole periods since the start, um; copies to the host.
+  /// How far each body has been moved back by whole periods since the start, um, of cells those of membranes(); copies to the host.
   virtual std::vector<Triple> wrapped_by() const = 0;
   /// Of the fluid on the cells, nW, where no tractions tell.
   virtual double power_on_cells() { return 0; }
@@ -81,6 +83,13 @@ class Coupling {
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.
   virtual Membranes* membranes() { return nullptr; }
+  /// Where every rank has its own; null where all ranks have all cells.
+  virtual SharedCells* shared_cells() { return nullptr; }
+  /// A checkpoint's cells are in shared_cells().
+  virtual void cells_restored() {}
+  /// Of the whole scene.
+  virtual int cells() { return membranes() ? membranes()->cells() : 0; }
+  virtual long vertices() { return surfaces().vertices; }
   virtual RigidBodies* rigid_bodies() { return nullptr; }
   /// The search and the flow at surfaces that cut the grid; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }

@@ -57,6 +57,7 @@ void EnergyBalance::sample(double elastic_fJ) {
   if (auto* membranes = simulation_.membranes()) {
     now.elastic = elastic_fJ;
     now.membrane_dissipation = membranes->dissipation_nW();
+    if (simulation_.shared_cells()) now.membrane_dissipation = simulation_.grid().comm().sum(now.membrane_dissipation);
     if (cut) now.membrane_kinetic = membranes->kinetic_energy_fJ();
   }
   if (state_.samples == 0) {

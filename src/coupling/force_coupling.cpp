@@ -7,33 +7,69 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
-#include "coupling/periodic_frame.hpp"
 #include "coupling/surface_checks.hpp"
 #include "immersed/surface_geometry.hpp"
-#include "membrane/interface.hpp"
+#include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
 
 namespace corpuscle {
 
+namespace {
+
+/// What a coupling needs of a scene whose cells are shared out: on a rank nothing grows with the number of all cells.
+Case without_cells(const Case& scene) {
+  Case rest;
+  rest.path = scene.path;
+  rest.time = scene.time;
+  rest.grid = scene.grid;
+  rest.fluid = scene.fluid;
+  rest.boundaries = scene.boundaries;
+  rest.coupling = scene.coupling;
+  return rest;
+}
+
+/// Within which cells act on each other, um.
+double contact_reach(const Case& scene) {
+  if (!scene.contact) return 0;
+  return std::max(scene.contact->range_um, scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0.0);
+}
+
+}  // namespace
+
 ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers)
-    : scene_(scene),
+    : scene_(without_cells(scene)),
       fluid_(fluid),
       timers_(timers),
       lengths_us_(schedule.lengths_us()),
-      membranes_(std::make_unique<Membranes>(scene.cells)),
-      frame_(periodic_frame(fluid.grid())),
+      workspace_(std::make_shared<Workspace>()),
+      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, contact_reach(scene), workspace_)),
+      membranes_(&cells_->membranes()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
-  const int vertices = membranes_->vertices();
-  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, vertices);
-  if (CellLoads::wanted(scene))
-    loads_ = std::make_unique<CellLoads>(scene_, fluid.grid().comm(), *membranes_, *transfer_, fluid.viscosity());
+  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
+                                         workspace_);
+  if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
   fluid.set_face_force(transfer_->faces());
   fluid.raise_reference_speed(quiet_speed_);
-  traction_ = Components<double>("corpuscle::coupling::traction", vertices, 3);
+  take_up();
+}
+
+/// The vertices are others than before.
+void ForceCoupling::take_up() {
+  transfer_->take_up(surfaces());
   Kokkos::deep_copy(membranes_->views().force, 0.0);
-  if (fluid.grid().comm().size() > 1) velocity_host_ = HostCopy(membranes_->surfaces().v);
-  if (frame_.periodic[0] || frame_.periodic[1] || frame_.periodic[2])
-    laps_ = Table<int>("corpuscle::coupling::laps", membranes_->cells(), 3);
+}
+
+/// What fails on one rank fails on all.
+template <class Work>
+void ForceCoupling::together(const Work& work) const {
+  std::string failure;
+  try {
+    work();
+  } catch (const ComputationError& error) {
+    failure = error.what();
+  }
+  failure = agree(fluid_.grid().comm(), failure);
+  if (!failure.empty()) throw ComputationError(failure);
 }
 
 std::string ForceCoupling::vertex_text(int vertex) const {
@@ -46,23 +82,21 @@ std::string ForceCoupling::vertex_text(int vertex) const {
                      x(vertex, 1), x(vertex, 2));
 }
 
-void ForceCoupling::wrap() {
-  if (!laps_.data()) return;
-  wrap_bodies(surfaces(), 0, membranes_->cells(), frame_, false, 0, {}, laps_);
-}
-
 /// Where the vertices are in the grid.
 /// @throws ComputationError  if one is outside
 void ForceCoupling::place(double time) {
-  const Comm& comm = fluid_.grid().comm();
-  const int beyond = transfer_->place(surfaces().x);
-  const double first = comm.min(beyond >= 0 ? beyond : 1e15);
-  if (first < 1e15)
-    throw ComputationError(
-        fmt::format("{} is outside the grid at {:.6g} us. Likely cause: a cell pressed against a wall, where nothing but the "
-                    "flow keeps it away, "
-                    "or a step too long; reduce time.step_us or move the cell (center_um)",
-                    vertex_text(static_cast<int>(first)), time));
+  together([&] {
+    const int beyond = transfer_->place(surfaces().x);
+    if (beyond >= 0)
+      throw ComputationError(fmt::format(
+          "{} is outside the grid at {:.6g} us. Likely cause: a cell pressed against a wall, where nothing but the flow keeps it "
+          "away, or a step too long; reduce time.step_us or move the cell (center_um)",
+          vertex_text(beyond), time));
+  });
+  watch_outflow();
+}
+
+void ForceCoupling::watch_outflow() {
   outflow_ = {};
   for (const auto& boundary : scene_.boundaries) {
     const int side = static_cast<int>(boundary.side), d = side / 2, end = side % 2;
@@ -72,23 +106,34 @@ void ForceCoupling::place(double time) {
     const NearSide near = nearest_to_side(transfer_->block(), transfer_->views(), d, end);
     if (near.distance < outflow_.distance) outflow_ = near;
   }
-  const double least = comm.min(outflow_.distance);
-  const double vertex = comm.max(outflow_.distance == least ? outflow_.vertex : -1.0);
-  outflow_ = {least, static_cast<int>(vertex)};
+  const double least = fluid_.grid().comm().min(outflow_.distance);
+  if (outflow_.distance > least) outflow_ = {least, -1};
 }
 
 void ForceCoupling::check_start() {
-  wrap();
-  coarse_ = check_surfaces(fluid_.grid(), scene_, surfaces());
+  const Comm& comm = fluid_.grid().comm();
+  cells_->to_copies(surfaces().x, true);
+  update_surface_geometry(surfaces());
+  std::vector<int> types;
+  for (const CellRecord& cell : cells_->own()) types.push_back(cell.type);
+  std::string wrong;
+  try {
+    coarse_ = check_surfaces(fluid_.grid(), scene_, surfaces(), types);
+  } catch (const InputError& error) {
+    wrong = error.what();
+  }
+  wrong = agree(comm, wrong);
+  if (!wrong.empty()) throw InputError(wrong);
+  coarse_ = agree(comm, coarse_);
   try {
     place(0);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
-  const double home = fluid_.grid().comm().sum(static_cast<double>(transfer_->at_home()));
-  if (home != membranes_->vertices())
-    throw InputError(fmt::format("cells: {} of {} vertices are nowhere in the grid: move the cells (center_um) into it",
-                                 membranes_->vertices() - home, membranes_->vertices()));
+  const double home = comm.sum(static_cast<double>(transfer_->at_home())), all = static_cast<double>(vertices());
+  if (home != all)
+    throw InputError(
+        fmt::format("cells: {} of {} vertices are nowhere in the grid: move the cells (center_um) into it", all - home, all));
   outflow_limit_ = scene_.time.stop_before_outflow_um;
   if (outflow_.distance < outflow_limit_) {
     outflow_limit_ = 0.5 * outflow_.distance;
@@ -130,7 +175,9 @@ void ForceCoupling::measure_stability() {
   model.viscosity = fluid_.viscosity();
   model.radius = (three ? 0.91 : 1.25) * spacing;  // of a marker alone: Delong et al., J. Chem. Phys. 140, 2014
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
-  stable_us_ = limit / std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
+  const double fastest =
+      std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
+  stable_us_ = limit / fluid_.grid().comm().max(fastest);
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
@@ -159,28 +206,21 @@ std::string ForceCoupling::outflow_limit(double dt) const {
 }
 
 std::string ForceCoupling::nearest_outflow() const {
-  return outflow_.vertex < 0 ? ""
-                             : fmt::format("{} is {:.3g} um from an outflow", vertex_text(outflow_.vertex), outflow_.distance);
-}
-
-/// Sums the ranks' parts.
-void ForceCoupling::collect() {
-  const Comm& comm = fluid_.grid().comm();
-  if (comm.size() == 1) return;
-  const auto& host = velocity_host_.read();
-  comm.sum(host.data(), 3 * membranes_->vertices());
-  velocity_host_.write();
+  const std::string text =
+      outflow_.vertex < 0 ? "" : fmt::format("{} is {:.3g} um from an outflow", vertex_text(outflow_.vertex), outflow_.distance);
+  return agree(fluid_.grid().comm(), text);
 }
 
 StepStatistics ForceCoupling::advance(double time, double dt) {
-  const SurfaceSet& set = surfaces();
+  const double ahead = second_order(dt) ? dt : 0;
   {
     const auto scope = timers_.scope("membrane");
-    wrap();
-    membranes_->set_out(second_order(dt) ? dt : 0);
-    if (loads_ && second_order(dt)) loads_->limit_ahead();
-    membranes_->compute_forces();
-    update_surface_geometry(set);
+    begin_step(time, dt, ahead);
+    membranes_->set_out(ahead);
+    cells_->to_copies(surfaces().x, true);
+    if (loads_ && ahead > 0) loads_->limit_ahead();
+    together([&] { membranes_->compute_forces(); });
+    update_surface_geometry(surfaces());
   }
   {
     const auto scope = timers_.scope("transfer");
@@ -189,18 +229,19 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
       const auto contact = timers_.scope("contact");
       loads_->gather(dt, second_order(dt));
     }
+    cells_->to_copies(forces());
     transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
   {
     const auto scope = timers_.scope("transfer");
     const SlipViews slip = slip_of_membranes();
-    transfer_->interpolate(fluid_.flux(), fluid_.velocity(), scene_.coupling->slip ? &slip : nullptr, set.v);
-    collect();
+    transfer_->interpolate(fluid_.flux(), fluid_.velocity(), scene_.coupling->slip ? &slip : nullptr, surfaces().v);
+    cells_->add_copies(surfaces().v);
   }
   {
     const auto scope = timers_.scope("membrane");
-    membranes_->drift(dt, second_order(dt) ? 0.5 : 0);
+    together([&] { membranes_->drift(dt, second_order(dt) ? 0.5 : 0); });
   }
   if (loads_) after_move(time + dt, dt);
   StepStatistics statistics;
@@ -209,15 +250,32 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   return statistics;
 }
 
+/// Cells that have come to this rank, or copies that are others than before, are looked at where the last step left them.
+void ForceCoupling::begin_step(double time, double dt, double ahead) {
+  if (!cells_->begin_step(ahead)) return;
+  take_up();
+  if (!loads_) return;
+  loads_->take_up();
+  update_copies();
+  loads_->look(time, dt);
+}
+
+void ForceCoupling::update_copies() {
+  cells_->to_copies(surfaces().x, true);
+  cells_->to_copies(surfaces().v);
+}
+
 void ForceCoupling::after_move(double time, double dt) {
   const auto scope = timers_.scope("contact");
+  update_copies();
   loads_->limit_approach(time);
-  wrap();
   loads_->look(time, dt);
 }
 
 void ForceCoupling::resume(double time) {
-  if (loads_) loads_->look(time, lengths_us_.front());
+  if (!loads_) return;
+  update_copies();
+  loads_->look(time, lengths_us_.front());
 }
 
 SlipViews ForceCoupling::slip_of_membranes() const {
@@ -230,33 +288,29 @@ double ForceCoupling::unresolved_dissipation() {
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
+  const std::size_t vertices = membranes_->vertices();
+  traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);
   force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);
   return traction_;
 }
 
-double ForceCoupling::power_on_cells() { return -power_of(membranes_->vertices(), membranes_->views().force, surfaces().v); }
+double ForceCoupling::power_on_cells() {
+  const double here = power_of(membranes_->vertices(), membranes_->views().force, surfaces().v);
+  return -fluid_.grid().comm().sum(here);
+}
 
 std::vector<Triple> ForceCoupling::wrapped_by() const {
-  std::vector<Triple> shift(membranes_->cells(), Triple{});
-  if (!laps_.data()) return shift;
-  const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), laps_);
-  for (std::size_t c = 0; c < shift.size(); ++c)
-    for (int d = 0; d < 3; ++d)
-      for (int m = 0; m < 3; ++m) shift[c][m] += laps(c, d) * frame_.period[d][m];
+  std::vector<Triple> shift;
+  for (const CellRecord& cell : cells_->own()) shift.push_back(cells_->wrapped_by(cell));
   return shift;
 }
 
-std::vector<double> ForceCoupling::state() const {
-  if (!laps_.data()) return {};
-  const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), laps_);
-  return {laps.data(), laps.data() + laps.span()};
-}
-
-void ForceCoupling::set_state(const std::vector<double>& state) {
-  if (!laps_.data()) return;
-  const auto laps = Kokkos::create_mirror_view(laps_);
-  for (std::size_t i = 0; i < laps.span(); ++i) laps.data()[i] = static_cast<int>(state.at(i));
-  Kokkos::deep_copy(laps_, laps);
+/// Where the cells are is known at once: a run may end with its checkpoint, at an outflow.
+void ForceCoupling::cells_restored() {
+  cells_->to_copies(surfaces().x, true);
+  take_up();
+  if (loads_) loads_->take_up();
+  place(0);
 }
 
 }  // namespace corpuscle

@@ -1,9 +1,9 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere, and move with it.
 #pragma once
 
+#include "cells/shared_cells.hpp"
 #include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
-#include "immersed/wrap.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -33,23 +33,28 @@ class ForceCoupling : public Coupling {
     if (loads_) loads_->resume(report);
   }
 
-  /// Periods taken off each cell since the start.
-  std::vector<double> state() const override;
-  void set_state(const std::vector<double>& state) override;
+  void cells_restored() override;
   void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
-  const SurfaceSet& surfaces() const override { return membranes_->surfaces(); }
-  Membranes* membranes() override { return membranes_.get(); }
+  const SurfaceSet& surfaces() const override { return cells_->surfaces(); }
+  Membranes* membranes() override { return membranes_; }
+  SharedCells* shared_cells() override { return cells_.get(); }
+  int cells() override { return cells_->total(); }
+  long vertices() override { return cells_->total_vertices(); }
 
  private:
   void place(double time_us);
-  void wrap();
-  void collect();
+  void take_up();
+  void watch_outflow();
+  template <class Work>
+  void together(const Work& work) const;
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
   /// The sum of all forces at the last gathering of loads.
   const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;
+  void begin_step(double time_us, double dt_us, double ahead_us);
+  void update_copies();
   void after_move(double time_us, double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
@@ -58,14 +63,13 @@ class ForceCoupling : public Coupling {
   FluidSolver& fluid_;
   Timers& timers_;
   std::vector<double> lengths_us_;  // of all steps there will be
-  std::unique_ptr<Membranes> membranes_;
+  std::shared_ptr<Workspace> workspace_;
+  std::unique_ptr<SharedCells> cells_;
+  Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
-  Components<double> traction_;                 // [vertex, 3] kPa
+  Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
-  HostCopy<Components<double>> velocity_host_;  // only on several ranks
-  PeriodicFrame frame_;
   double quiet_speed_;        // um/us: what counts as rest
-  Table<int> laps_;           // [cell, 3] only in periodic domains
   std::string coarse_;        // which cells the grid resolves coarsely
   double stable_us_ = 0;      // largest stable step at the start
   double outflow_limit_ = 0;  // um

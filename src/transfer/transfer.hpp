@@ -1,6 +1,9 @@
 // Forces from vertices to the grid's faces and velocities back, with one kernel and its transpose.
 #pragma once
 
+#include <memory>
+
+#include "core/workspace.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
 #include "immersed/surface_views.hpp"
@@ -13,8 +16,12 @@ class Transfer {
  public:
   /// @param boundaries  one entry per side
   /// @param vertices    how many place() is called with
-  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices);
+  /// @param workspace   shared with others that do not use it between place() and interpolate()
+  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
+           std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
+  /// The vertices are others from now on.
+  void take_up(const SurfaceSet& set);
   /// Find the vertices' positions x [vertex, 3], um, in the grid. Must precede the calls below.
   /// @returns the lowest vertex that is outside the grid on this rank, or -1
   int place(const Components<double>& x);
@@ -32,17 +39,16 @@ class Transfer {
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
                  const Array<double>& gap = {}) const;
 
-  /// Vertices that lie in this rank's own cells, after place(). Over all ranks all of them do.
+  /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
   /// The widest spacing of this rank's block, um.
   double largest_spacing() const { return largest_spacing_; }
-  /// Shifts under which vertices are seen; the identity first.
-  const PeriodImages& images() const { return search_.images; }
   int markers() const { return markers_.count; }
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
 
  private:
+  void make_places(int vertices);
   void make_room(int markers);
   template <class Use>
   void with_kernel(const Use& use) const;
@@ -54,6 +60,7 @@ class Transfer {
   VertexPlaces places_;
   HostCopy<Array<int>> beyond_host_;
   MarkerViews markers_;
+  std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
   double largest_spacing_ = 0;
   FaceForce faces_;

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "../fluid/fluid_fixture.hpp"
+#include "cells/rank_blocks.hpp"
 #include "held_surface.hpp"
 
 using namespace corpuscle;
@@ -14,22 +15,25 @@ namespace {
 constexpr int n = 4, high = 8;                       // cells along and across, of 1 um
 constexpr int along = 2 * n, count = along * along;  // markers
 
-/// A plate of markers between walls, `gap` from one of them.
+/// A plate of markers between walls, `gap` from one of them, with its copies beyond the periodic sides. On every rank by itself:
+/// the grid is too small to be cut.
 struct Plate {
   Plate(double gap, const Vec3& normal_of, const Vec3& force_per_area)
       : boundaries(sides({Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic})),
-        grid(Comm(), make_node_source(nodes()), {true, false, true}),
-        transfer(grid, boundaries, CouplingSettings::Kernel::three_point, count) {
-    set.vertices = count;
-    set.x = Components<double>("corpuscle::test::x", count, 3);
-    set.normal = Components<double>("corpuscle::test::normal", count, 3);
-    set.area = Array<double>("corpuscle::test::area", count);
-    force = Components<double>("corpuscle::test::force", count, 3);
-    velocity = Components<double>("corpuscle::test::velocity", count, 3);
+        grid(Comm::alone(), make_node_source(nodes()), {true, false, true}),
+        shifts(period_shifts(grid)),
+        vertices(count * static_cast<int>(shifts.size())),
+        transfer(grid, boundaries, CouplingSettings::Kernel::three_point, vertices) {
+    set.vertices = vertices;
+    set.x = Components<double>("corpuscle::test::x", vertices, 3);
+    set.normal = Components<double>("corpuscle::test::normal", vertices, 3);
+    set.area = Array<double>("corpuscle::test::area", vertices);
+    force = Components<double>("corpuscle::test::force", vertices, 3);
+    velocity = Components<double>("corpuscle::test::velocity", vertices, 3);
     const auto x = Kokkos::create_mirror_view(set.x), normal = Kokkos::create_mirror_view(set.normal),
                f = Kokkos::create_mirror_view(force);
-    for (int v = 0; v < count; ++v) {
-      store(x, v, Vec3{0.13 + 0.5 * (v % along), gap, 0.07 + 0.5 * (v / along)});
+    for (int v = 0; v < vertices; ++v) {
+      store(x, v, Vec3{0.13 + 0.5 * (v % along), gap, 0.07 + 0.5 * (v % count / along)} + shifts[v / count]);
       store(normal, v, normal_of);
       store(f, v, 0.25 * force_per_area);
     }
@@ -49,12 +53,14 @@ struct Plate {
     transfer.interpolate(flux, u, slip ? &correction : nullptr, velocity);
     const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), velocity);
     Vec3 sum;
-    for (int i = 0; i < count; ++i) sum += (1.0 / count) * load(v, i);
+    for (int i = 0; i < vertices; ++i) sum += (1.0 / count) * load(v, i);  // each has what is at home of it
     return sum;
   }
 
   std::vector<BoundarySettings> boundaries;
   Grid grid;
+  std::vector<Vec3> shifts;
+  int vertices;
   Transfer transfer;
   SurfaceSet set;
   Components<double> force, velocity;
