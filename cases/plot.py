@@ -6,6 +6,7 @@ Makes, from what is there,
   velocity.png    velocity magnitude on the middle plane at the last stored time
   history.png     histories of every cell or body
   stretching.png  diameters against force, over the experiment
+  blood.png       hematocrit and velocity across the flow with their errors, and what was sampled over time
 Needs h5py, numpy and matplotlib, in this Python or in another one of this machine; no display.
 """
 
@@ -147,22 +148,18 @@ def plot_velocity(fields, times, cells, cell_times, out):
     save(figure, out / "velocity.png")
 
 
-def read_history(path):
-    """Columns of history.csv as arrays, empty fields as NaN; None where there is none."""
-    file = path / "history.csv"
-    if not file.exists():
-        print(f"plot.py: no history.csv in {path}: left out")
-        return None
+def read_table(file):
+    """Columns of a CSV file as arrays, empty fields as NaN; None where it holds no line but its names."""
     try:
         with open(file, newline="") as lines:
             rows = list(csv.reader(lines))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         fail(f"{file}: cannot be read as text: {error}")
     if len(rows) < 2:
-        print("plot.py: history.csv holds no sample: left out")
+        print(f"plot.py: {file.name} holds no sample: left out")
         return None
-    if "time_us" not in rows[0] or "cell" not in rows[0]:
-        fail(f"{file}: its first line is not that of a history: it names no time_us and cell")
+    if "time_us" not in rows[0]:
+        fail(f"{file}: its first line is not that of a table of samples: it names no time_us")
     values = []
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(rows[0]):  # cut off by a kill
@@ -173,6 +170,18 @@ def read_history(path):
             fail(f"{file}, line {number}: {error}")
     values = np.array(values).reshape(-1, len(rows[0]))
     return {name: values[:, c] for c, name in enumerate(rows[0])}
+
+
+def read_history(path):
+    """Columns of history.csv; None where there is none."""
+    file = path / "history.csv"
+    if not file.exists():
+        print(f"plot.py: no history.csv in {path}: left out")
+        return None
+    history = read_table(file)
+    if history is not None and "cell" not in history:
+        fail(f"{file}: its first line is not that of a history: it names no cell")
+    return history
 
 
 def plot_history(history, out):
@@ -216,6 +225,46 @@ def plot_stretching(history, experiment, out):
     axis.set_ylabel("diameter, um")
     axis.legend()
     save(figure, out / "stretching.png")
+
+
+def plot_blood(path, out):
+    """Profiles of blood.h5 with bars of one standard error, and the columns of blood.csv over time."""
+    profile = None
+    if (path / "blood.h5").exists():
+        with h5py.File(path / "blood.h5", "r") as data:
+            across = data.attrs["across"]
+            across = across.decode() if isinstance(across, bytes) else str(across)
+            profile = {name: values[()] for name, values in data["profile"].items()}
+    else:
+        print(f"plot.py: no blood.h5 in {path}: profiles left out")
+    samples = read_table(path / "blood.csv")
+    names = [n for n, v in samples.items() if n != "time_us" and not np.isnan(v).all()] if samples else []
+    panels = (2 if profile else 0) + len(names)
+    if not panels:
+        print("plot.py: nothing was sampled of blood: blood.png left out")
+        return
+    rows = (panels + 2) // 3
+    figure, axes = plt.subplots(rows, 3, figsize=(13, 3 * rows), layout="constrained", squeeze=False)
+    left = iter(axes.flat)
+    if profile:
+        edges = profile["edge_um"]
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        for name, unit, places in (("hematocrit", "", middle), ("velocity", "_mm_per_s", profile["velocity_um"])):
+            axis = next(left)
+            axis.errorbar(places, profile[name + unit], profile[f"{name}_error{unit}"], fmt="o-", capsize=2, markersize=3)
+            axis.set_xlim(edges[0], edges[-1])
+            axis.set_ylim(bottom=min(0, np.nanmin(profile[name + unit])))
+            axis.set_xlabel(across + ", um")
+            axis.set_title(name + (", mm/s" if unit else ""), fontsize=9)
+    for name in names:
+        axis = next(left)
+        axis.plot(samples["time_us"], samples[name], linewidth=1)
+        axis.set_xlabel("time, us")
+        axis.set_title(name, fontsize=9)
+        axis.ticklabel_format(useOffset=False)
+    for axis in left:
+        axis.set_visible(False)
+    save(figure, out / "blood.png")
 
 
 def experiment_of(path):
@@ -273,6 +322,8 @@ def draw(path, out):
         plot_stretching(history, experiment_of(path), out)
     elif history is not None:
         plot_history(history, out)
+    if (path / "blood.csv").exists():
+        plot_blood(path, out)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 #include "app/figure_levels.hpp"
 #include "app/reference_flows.hpp"
+#include "blood/guided_flow.hpp"
 #include "cells/cell_state.hpp"
 #include "common/extremes.hpp"
 #include "core/error.hpp"
@@ -20,8 +21,8 @@ namespace corpuscle {
 
 namespace {
 
-/// Further columns of cells that move in a flow.
-const std::vector<std::string> shape_columns = {"rear_hollow_um", "front_dimple_um", "length_um", "diameter_um",
+/// Further columns of cells that move in a flow, before those of their shapes.
+const std::vector<std::string> parachute_columns = {"rear_hollow_um", "front_dimple_um", "length_um", "diameter_um",
                                                 "asymmetry"};
 /// Further columns of rigid bodies: the force from the fluid's momentum balance, beside that from tractions.
 const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance_force_y_nN", "balance_force_z_nN"};
@@ -75,14 +76,18 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
   columns.bodies = simulation.rigid_bodies() != nullptr;
-  if (columns.cells) columns.more = shape_columns;
+  if (columns.cells) columns.more = find_columns();
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
   if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
+  if (scene_.blood) {
+    blood_ = std::make_unique<BloodSampler>(scene_, simulation);
+    blood_files_ = std::make_unique<BloodFiles>(folder_, comm, restart_us);
+  }
 #ifdef CORPUSCLE_HDF5
   if (scene_.output.fields)
     fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
                                             simulation.grid().owned_nodes().data(), restart_us);
-  few_cells_ = simulation.cells() <= few_cells || !simulation.shared_cells();
+  few_cells_ = simulation.cells() <= scene_.output.cells_in_history || !simulation.shared_cells();
   if (!few_cells_) std::vector<CellSettings>().swap(scene_.cells);  // nothing on a rank grows with the number of all cells
   if (scene_.output.cells && simulation.shared_cells()) {
     cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
@@ -93,6 +98,20 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
     cells_ = std::make_unique<CellWriter>(folder_, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
   }
 #endif
+}
+
+/// Of the history, of cells; what measures them is made for it.
+const std::vector<std::string>& FlowOutput::find_columns() {
+  const auto flow = find_guided_flow(scene_, simulation_.fluid());
+  shapes_ = std::make_unique<CellShapes>(simulation_.membranes()->types(), flow ? &flow->frame : nullptr);
+  shape_columns_ = parachute_columns;
+  shape_columns_.insert(shape_columns_.end(), shapes_->columns().begin(), shapes_->columns().end());
+  return shape_columns_;
+}
+
+const std::vector<std::vector<double>>& FlowOutput::measure_shapes() {
+  const Membranes& membranes = *simulation_.membranes();
+  return shapes_->measure(membranes.surfaces(), membranes.cells(), membranes.views().type);
 }
 
 /// Whether this step is the last, or the first at or after a multiple of `every_us`.
@@ -144,6 +163,7 @@ void FlowOutput::after_step(bool start) {
     energy_.sample(elastic_energy_);
   }
   if (!start) sample_flow();
+  if (!start) sample_blood();
   if (start || due(output.every_us)) {
     write_fields();
     write_cells();
@@ -191,7 +211,9 @@ void FlowOutput::watch_shared_cells(const std::vector<CellDiagnostics>& cells) {
 }
 
 /// @param travelled  by how much the cell has been moved back through periodic sides, um
-HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const {
+/// @param turned     what CellShapes has found
+HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled,
+                                      const std::vector<double>& turned) const {
   HistorySample sample;
   sample.time_us = simulation_.time();
   sample.cell = simulation_.membranes()->number(cell);
@@ -207,6 +229,7 @@ HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const 
   const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
                                         moving ? v : scene_.cells[sample.cell].axis);
   sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};
+  sample.more.insert(sample.more.end(), turned.begin(), turned.end());
   return sample;
 }
 
@@ -226,9 +249,11 @@ void FlowOutput::measure() {
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
     const auto travelled = simulation_.coupling()->wrapped_by();
+    static const std::vector<std::vector<double>> none;
+    const auto& turned = few_cells_ ? measure_shapes() : none;
     for (std::size_t c = 0; c < cells.size(); ++c) {
-      auto sample = cell_sample(static_cast<int>(c), cells[c], travelled[c]);
-      if (simulation_.rigid_bodies()) sample.more.resize(shape_columns.size() + balance_columns.size(), std::nan(""));
+      auto sample = cell_sample(static_cast<int>(c), cells[c], travelled[c], few_cells_ ? turned[c] : std::vector<double>());
+      if (simulation_.rigid_bodies()) sample.more.resize(shape_columns_.size() + balance_columns.size(), std::nan(""));
       last_.push_back(sample);
     }
     if (simulation_.shared_cells()) gather_samples();
@@ -241,7 +266,7 @@ void FlowOutput::gather_samples() {
   const Comm& comm = simulation_.grid().comm();
   elastic_energy_ = comm.sum(elastic_energy_);
   constexpr std::size_t width = 12;
-  const std::size_t more = few_cells_ ? shape_columns.size() : 0, rows = few_cells_ ? simulation_.cells() : 1;
+  const std::size_t more = few_cells_ ? shape_columns_.size() : 0, rows = few_cells_ ? simulation_.cells() : 1;
   std::vector<double> table(rows * (width + more), 0.0);
   for (const auto& sample : last_) {
     double* row = table.data() + (few_cells_ ? sample.cell * (width + more) : 0);
@@ -288,7 +313,7 @@ void FlowOutput::measure_bodies() {
     sample.velocity_um_per_us = bodies->velocity(b);
     sample.force_nN = loads[number][0];
     sample.torque_nN_um = loads[number][1];
-    if (simulation_.membranes()) sample.more.assign(shape_columns.size(), std::nan(""));
+    if (simulation_.membranes()) sample.more.assign(shape_columns_.size(), std::nan(""));
     for (double f : balance_force[number]) sample.more.push_back(f);
     last_.push_back(sample);
   }
@@ -301,7 +326,7 @@ void FlowOutput::write_fields() {
   const CellBox owned{{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
   std::vector<CellField> fields;
   std::vector<CellLabels> labels;
-  std::vector<double> velocity, pressure;
+  std::vector<double> velocity, pressure, stress;
   std::vector<std::int8_t> kind;
   if (scene_.output.velocity) {
     velocity = interleaved(index, owned, simulation_.fluid().velocity());
@@ -311,6 +336,10 @@ void FlowOutput::write_fields() {
     pressure = box_values(index, owned, simulation_.fluid().pressure());
     fields.push_back({"pressure_kPa", 1, pressure.data()});
   }
+  if (scene_.output.wall_shear_stress) {
+    stress = wall_stress_Pa();
+    fields.push_back({"wall_shear_stress_Pa", 3, stress.data()});
+  }
   if (scene_.output.kind) {
     for (auto value : box_integers(index, owned, simulation_.fluid().kind()))
       kind.push_back(static_cast<std::int8_t>(value));
@@ -318,6 +347,16 @@ void FlowOutput::write_fields() {
   }
   fields_->write(simulation_.time(), simulation_.steps(), fields, labels);
 #endif
+}
+
+/// On this block's cells beside walls.
+std::vector<double> FlowOutput::wall_stress_Pa() {
+  const IndexSpace& index = simulation_.grid().index();
+  if (!wall_stress_.data()) wall_stress_ = Components<double>("corpuscle::blood::wall_stress", index.size(), 3);
+  find_wall_stress(scene_.boundaries, simulation_.fluid(), wall_stress_);
+  auto values = interleaved(index, {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}, wall_stress_);
+  for (double& value : values) value /= units::Pa;
+  return values;
 }
 
 void FlowOutput::write_cells() {
@@ -351,16 +390,27 @@ void FlowOutput::write_shared_cells() {
     extent.insert(extent.end(), size.begin(), size.end());
     area.push_back(cells[c].area_um2), volume.push_back(cells[c].volume_um3), energy.push_back(cells[c].energy_fJ());
   }
+  std::vector<CellTable> tables{{"centroid_um", 3, centroid.data()}, {"velocity_um_per_us", 3, velocity.data()},
+                                {"extent_um", 3, extent.data()},     {"area_um2", 1, area.data()},
+                                {"volume_um3", 1, volume.data()},    {"elastic_energy_fJ", 1, energy.data()}};
+  const auto& names = shapes_->columns();
+  std::vector<std::vector<double>> turned(names.size());
+  for (const auto& row : measure_shapes())
+    for (std::size_t n = 0; n < names.size(); ++n) turned[n].push_back(row[n]);
+  for (std::size_t n = 0; n < names.size(); ++n) tables.push_back({names[n], 1, turned[n].data()});
   cells_->write(simulation_.time(), simulation_.steps(), share_of(shared), x.data(),
-                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}},
-                {{"centroid_um", 3, centroid.data()}, {"velocity_um_per_us", 3, velocity.data()},
-                 {"extent_um", 3, extent.data()}, {"area_um2", 1, area.data()}, {"volume_um3", 1, volume.data()},
-                 {"elastic_energy_fJ", 1, energy.data()}});
+                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}}, tables);
 #endif
+}
+
+void FlowOutput::sample_blood() {
+  if (!blood_ || !blood_->due()) return;
+  blood_files_->write(blood_->sample());
 }
 
 void FlowOutput::write_checkpoint_now() {
 #ifdef CORPUSCLE_HDF5
+  if (blood_) blood_files_->write_profile(*blood_, simulation_.time());
   const std::string path = folder_ + "/checkpoint.h5";
   std::string totals = to_text(totals_now());
   simulation_.grid().comm().broadcast(totals);
@@ -380,6 +430,7 @@ void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& to
   energy_.resume(totals.energy);
   if (simulation_.immersed()) simulation_.immersed()->resume(totals.immersed);
   if (simulation_.coupling()) simulation_.coupling()->resume_contact(totals.contact);
+  if (blood_) blood_->resume(totals.blood);
 }
 
 /// All that has been counted, of this run and those before it.
@@ -391,6 +442,7 @@ RunTotals FlowOutput::totals_now(bool together) {
   if (simulation_.immersed() && together) now.immersed = simulation_.immersed()->report();
   if (simulation_.coupling())
     if (const auto contact = simulation_.coupling()->contact_report()) now.contact = *contact;
+  if (blood_) now.blood = blood_->state();
   now.wall_s += largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
   for (const auto& [part, seconds] : timers_.seconds()) now.wall_s_by_part[part] += largest(seconds);
   return now;
@@ -425,7 +477,7 @@ void FlowOutput::fill_quantities(Report& report) const {
       all[of + "speed_mm_per_s"] = std::hypot(v[0], v[1], v[2]) / units::mm_per_s;
       all[of + "area_um2"] = *sample.area_um2;
       all[of + "elastic_energy_fJ"] = *sample.elastic_energy_fJ;
-      for (std::size_t n = 0; n < shape_columns.size(); ++n) all[of + shape_columns[n]] = sample.more[n];
+      for (std::size_t n = 0; n < shape_columns_.size(); ++n) all[of + shape_columns_[n]] = sample.more[n];
     }
     for (int d = 0; d < 3; ++d) {
       if (cell) all[of + "centroid_" + axes[d] + "_um"] = (*sample.centroid_um)[d];
@@ -502,8 +554,22 @@ void FlowOutput::fill_broken(Report& report, bool together) {
   judge_figures(report);
 }
 
+void FlowOutput::fill_blood(Report& report, const ContactReport& contact) const {
+  if (!blood_) return;
+  auto block = blood_->report();
+  if (simulation_.coupling()->contact_report()) {
+    block["crossings"] = contact.crossings;
+    if (contact.smallest_gap < 1e30) block["smallest_gap_um"] = contact.smallest_gap;
+  }
+  blood_->add_notes(block);
+  report.extra["blood"] = block;
+}
+
 void FlowOutput::fill(Report& report) {
-  fill_totals(report, totals_now());
+  const RunTotals totals = totals_now();
+  fill_totals(report, totals);
+  fill_blood(report, totals.contact);
+  if (blood_) blood_files_->write_profile(*blood_, simulation_.time());
   auto& errors = report.errors;
   errors["convection_over_viscosity"] = convection_over_viscosity(simulation_.fluid());
   if (simulation_.immersed()) {

@@ -3,6 +3,8 @@
 
 #include "app/run_totals.hpp"
 #include "app/scene_runs.hpp"
+#include "blood/blood_files.hpp"
+#include "blood/cell_shapes.hpp"
 #include "coupling/energy_balance.hpp"
 #include "output/cell_writer.hpp"
 #include "output/field_writer.hpp"
@@ -25,9 +27,6 @@ class FlowOutput {
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
   /// a run warns at its end, beyond the second it is stopped.
   static constexpr double lysis_area = 0.04, senseless_area = 0.1;
-
-  /// Up to so many cells each has lines in the history; of more the history has the means, and cells.h5 what each does.
-  static constexpr int few_cells = 16;
 
   /// After every step (and before the first, with `start`): whatever is due.
   /// @throws ComputationError  when a file cannot be written, or a membrane has stretched far beyond what one can
@@ -59,11 +58,16 @@ class FlowOutput {
   void fill_energy(Report& report) const;
   void fill_quantities(Report& report) const;
   void judge_figures(Report& report) const;
-  HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
+  HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled, const std::vector<double>& turned) const;
+  const std::vector<std::string>& find_columns();
+  const std::vector<std::vector<double>>& measure_shapes();
+  std::vector<double> wall_stress_Pa();
   void watch_cells(const std::vector<CellDiagnostics>& cells);
   void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
   void gather_samples();
   void write_shared_cells();
+  void sample_blood();
+  void fill_blood(Report& report, const ContactReport& contact) const;
 
   std::string folder_, run_, files_;
   Case scene_;
@@ -76,7 +80,12 @@ class FlowOutput {
   std::unique_ptr<CellWriter> cells_;
 #endif
   std::string last_checkpoint_;
-  bool few_cells_ = true;  // each has lines of its own in the history
+  bool few_cells_ = true;  // each has lines of its own in the history; cells.h5 has what each of many does
+  std::unique_ptr<CellShapes> shapes_;
+  std::unique_ptr<BloodSampler> blood_;
+  std::unique_ptr<BloodFiles> blood_files_;
+  Components<double> wall_stress_;
+  std::vector<std::string> shape_columns_;  // of the history, of cells
   RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
   std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
   std::chrono::steady_clock::time_point start_;

@@ -56,6 +56,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   add("membrane", cells);
   add("membrane viscosity", viscous);
   add("coupling", fluid && cells);
+  add("blood statistics", force && scene.blood);
   add("stretching", scene.stretching.has_value());
   add("halo exchange between ranks", fluid && ranks > 1);
   add("field output", fluid && files && scene.output.fields);

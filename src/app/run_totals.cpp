@@ -18,7 +18,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, d
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ContactReport, crossings, limited, smallest_gap, lists)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
                                    volume_drift, area_drift, speed, slip_speed, splitting_us,
-                                   splitting_until_us, splitting_max, immersed, contact, energy, wall_s, wall_s_by_part)
+                                   splitting_until_us, splitting_max, immersed, contact, energy, blood, wall_s, wall_s_by_part)
 
 namespace {
 

@@ -103,7 +103,7 @@ StretchingSettings read_stretching(Section& s) {
 namespace {
 
 void read_fields(Section& s, OutputSettings& o, bool has_fluid) {
-  const std::string allowed = "must be true, false or a list of \"velocity\", \"pressure\", \"kind\"";
+  const std::string allowed = "must be true, false or a list of \"velocity\", \"pressure\", \"kind\", \"wall_shear_stress\"";
   o.fields = o.velocity = o.pressure = o.kind = has_fluid;
   s.describe("fields", allowed.substr(std::string("must be ").size()), "true");
   if (const auto* found = s.node("fields")) {
@@ -116,7 +116,8 @@ void read_fields(Section& s, OutputSettings& o, bool has_fluid) {
         bool* chosen = name == "velocity"   ? &o.velocity
                        : name == "pressure" ? &o.pressure
                        : name == "kind"     ? &o.kind
-                                            : nullptr;
+                       : name == "wall_shear_stress" ? &o.wall_shear_stress
+                                                     : nullptr;
         if (!entry.is_string() || !chosen) s.fail("fields", allowed);
         *chosen = true;
       }
@@ -127,7 +128,8 @@ void read_fields(Section& s, OutputSettings& o, bool has_fluid) {
     if (o.fields && !has_fluid) s.fail("fields", "there is no [fluid], so there are no fields to write");
   }
   std::string names;
-  for (const auto& [chosen, name] : {std::pair{o.velocity, "velocity"}, {o.pressure, "pressure"}, {o.kind, "kind"}})
+  for (const auto& [chosen, name] : {std::pair{o.velocity, "velocity"}, {o.pressure, "pressure"}, {o.kind, "kind"},
+                                     {o.wall_shear_stress, "wall_shear_stress"}})
     if (chosen) names += (names.empty() ? "" : ", ") + toml_text(std::string(name));
   s.echo_line("fields", o.fields ? "[" + names + "]" : "false");
 }
@@ -141,6 +143,7 @@ OutputSettings read_output(Section& s, bool has_fluid, bool has_surfaces) {
   o.checkpoint_every_us = s.number("checkpoint_every_us", not_negative(), o.checkpoint_every_us);
   read_fields(s, o, has_fluid);
   o.cells = s.flag("cells", has_surfaces);
+  o.cells_in_history = s.integer("cells_in_history", 0, 1000000, o.cells_in_history);
   s.finish();
   if (o.cells && !has_surfaces) s.fail("cells", "there are no [[cells]] or [[bodies]] to write");
   return o;

@@ -178,6 +178,16 @@ struct ContactSettings {
   bool operator==(const ContactSettings&) const = default;
 };
 
+/// [blood]: what is measured of many cells in a flow
+struct BloodSettings {
+  double from_us = 0;                   // sampling begins
+  double sample_every_us = 0;           // 0: every step
+  int bins = 0;                         // of profiles; 0: about a spacing wide
+  double layer_window_um = 1;           // length of the windows in which the outermost membrane is looked for
+
+  bool operator==(const BloodSettings&) const = default;
+};
+
 /// [stretching]: a cell pulled by two opposite forces, no fluid
 struct StretchingSettings {
   double force_pN = 200;
@@ -197,7 +207,9 @@ struct OutputSettings {
   double checkpoint_every_us = 0;       // 0: only at the end
   bool fields = true;                   // false, or a list in the case file: which are written
   bool velocity = true, pressure = true, kind = true;
+  bool wall_shear_stress = false;       // a field
   bool cells = true;
+  int cells_in_history = 16;            // up to so many cells each has lines in the history
 
   bool operator==(const OutputSettings&) const = default;
 };
@@ -216,6 +228,7 @@ struct Case {
   std::vector<BodySettings> bodies;
   std::optional<CouplingSettings> coupling;
   std::optional<ContactSettings> contact;
+  std::optional<BloodSettings> blood;
   std::optional<StretchingSettings> stretching;
   OutputSettings output;
 };

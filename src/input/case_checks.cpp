@@ -135,7 +135,8 @@ void check_modules(const Case& scene, const Complaint& complain) {
                                                              {!scene.boundaries.empty(), "boundary"},
                                                              {!scene.bodies.empty(), "bodies"},
                                                              {scene.coupling.has_value(), "coupling"},
-                                                             {scene.contact.has_value(), "contact"}})
+                                                             {scene.contact.has_value(), "contact"},
+                                                             {scene.blood.has_value(), "blood"}})
       if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
     if (scene.cells.size() != 1)
       complain("stretching", "",
@@ -157,7 +158,19 @@ void check_modules(const Case& scene, const Complaint& complain) {
     complain("contact", "",
              scene.cells.empty() ? "there are no [[cells]] to touch each other: leave this section out"
                                  : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
+  if (scene.blood && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
+    complain("blood", "",
+             scene.cells.empty() ? "there are no [[cells]] to measure: leave this section out"
+                                 : "blood is measured where the fluid is everywhere, in cells too: set coupling.scheme = \"force\", or leave "
+                                   "this section out");
   check_boundaries(scene, complain);
+}
+
+void check_sampling(const Case& scene, const Complaint& complain) {
+  if (scene.blood && !(scene.blood->from_us < scene.time.end_us))
+    complain("blood", "from_us",
+             fmt::format("sampling would begin at {:g} us, and the run ends at {:g} us (time.end_us): begin earlier, or run longer",
+                         scene.blood->from_us, scene.time.end_us));
 }
 
 }  // namespace corpuscle

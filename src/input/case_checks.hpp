@@ -17,6 +17,9 @@ void check_boundaries(const Case& scene, const Complaint& complain);
 /// Sections that need each other or exclude each other.
 void check_modules(const Case& scene, const Complaint& complain);
 
+/// After [time]: whether anything is sampled at all.
+void check_sampling(const Case& scene, const Complaint& complain);
+
 const char* name_of(BoundarySettings::Side side);
 
 }  // namespace corpuscle

@@ -43,6 +43,7 @@ class CaseReader {
     const bool coupled = scene.fluid && !scene.cells.empty();
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
     if (root_.contains("contact")) scene.contact = one<ContactSettings>("contact", read_contact);
+    if (root_.contains("blood")) scene.blood = one<BloodSettings>("blood", read_blood);
     if (root_.contains("stretching")) scene.stretching = one<StretchingSettings>("stretching", read_stretching);
     check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) {
@@ -50,6 +51,7 @@ class CaseReader {
       note_without_contact(scene);
     }
     read_time_section(scene);
+    check_sampling(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
     scene.resolved = echo_;

@@ -83,6 +83,7 @@ Read reader_of(const std::string& name) {
   if (name == "bodies") return read_body;
   if (name == "coupling") return read_coupling;
   if (name == "contact") return read_contact;
+  if (name == "blood") return read_blood;
   if (name == "stretching") return read_stretching;
   if (name == "output") return [](Section& s) { read_output(s, true, true); };
   return {};

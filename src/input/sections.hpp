@@ -21,6 +21,7 @@ CellSettings read_cell(Section& s, const std::vector<CellTypeSettings>& types, b
 BodySettings read_body(Section& s);
 CouplingSettings read_coupling(Section& s);
 ContactSettings read_contact(Section& s);
+BloodSettings read_blood(Section& s);
 StretchingSettings read_stretching(Section& s);
 OutputSettings read_output(Section& s, bool has_fluid, bool has_surfaces);
 

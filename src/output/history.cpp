@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
-#include "core/error.hpp"
 #include "core/units.hpp"
 #include "output/on_root.hpp"
 
@@ -22,7 +19,7 @@ std::string header(const HistoryColumns& columns) {
   if (columns.stretching) names += ",axial_um,transverse_um,force_pN";
   if (columns.bodies) names += ",force_x_nN,force_y_nN,force_z_nN,torque_x_nN_um,torque_y_nN_um,torque_z_nN_um";
   for (const auto& name : columns.more) names += "," + name;
-  return names + "\n";
+  return names;
 }
 
 void add(std::string& line, const std::optional<double>& value, double unit = 1) {
@@ -34,40 +31,13 @@ void add(std::string& line, const std::optional<Triple>& values, double unit = 1
   for (int d = 0; d < 3; ++d) add(line, values ? std::optional((*values)[d]) : std::nullopt, unit);
 }
 
-// Length of the part of an existing history to keep: its header and the whole lines up to the time of restart.
-long kept_bytes(const std::string& path, const std::string& expected_header, double restart_us) {
-  std::ifstream in(path, std::ios::binary);
-  std::string line;
-  std::getline(in, line);
-  if (line + "\n" != expected_header)
-    throw InputError(fmt::format(
-        "{}: cannot continue this file, its columns are not those of this case; choose another folder with --out",
-        path));
-  long bytes = static_cast<long>(expected_header.size());
-  // Times are multiples of the step: half an ulp-sized slack keeps the line of the restart time itself.
-  const double last = restart_us * (1 + 1e-12);
-  while (std::getline(in, line) && !in.eof() && std::strtod(line.c_str(), nullptr) <= last)
-    bytes += static_cast<long>(line.size()) + 1;
-  return bytes;
-}
-
 }  // namespace
 
 HistoryWriter::HistoryWriter(const std::string& folder, const Comm& comm, const HistoryColumns& columns,
                              std::optional<double> restart_us)
-    : comm_(comm), columns_(columns) {
-  on_root(comm_, [&] { open((std::filesystem::path(folder) / "history.csv").string(), restart_us); });
-}
-
-void HistoryWriter::open(const std::string& path, std::optional<double> restart_us) {
-  const auto names = header(columns_);
-  if (restart_us && std::filesystem::exists(path)) {
-    file_ = std::make_unique<TextFile>(path, kept_bytes(path, names, *restart_us));
-  } else {
-    file_ = std::make_unique<TextFile>(path);
-    file_->write(names);
-  }
-}
+    : comm_(comm),
+      columns_(columns),
+      table_((std::filesystem::path(folder) / "history.csv").string(), comm, header(columns), restart_us) {}
 
 void HistoryWriter::write(const HistorySample& sample) {
   on_root(comm_, [&] {
@@ -92,7 +62,7 @@ void HistoryWriter::write(const HistorySample& sample) {
     }
     for (std::size_t m = 0; m < columns_.more.size(); ++m)
       add(line, m < sample.more.size() ? std::optional(sample.more[m]) : std::nullopt);
-    file_->write(line + "\n");
+    table_.write(line);
   });
 }
 

@@ -1,13 +1,12 @@
 // history.csv: one line per sample and body, every number with all its digits.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "input/case.hpp"
-#include "output/text_file.hpp"
+#include "output/sample_table.hpp"
 #include "parallel/comm.hpp"
 
 namespace corpuscle {
@@ -42,11 +41,9 @@ class HistoryWriter {
   void write(const HistorySample& sample);
 
  private:
-  void open(const std::string& path, std::optional<double> restart_us);
-
   Comm comm_;
   HistoryColumns columns_;
-  std::unique_ptr<TextFile> file_;  // rank 0 only
+  SampleTable table_;
 };
 
 }  // namespace corpuscle

@@ -279,6 +279,18 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(contact("aggregation_energy_fJ_per_um2 = 1e-3\naggregation_range_um = 0.2"),
                 {":16: contact.aggregation_range_um", "1.2 times range_um"});
   require_parts(contact("pressure_kPa = 1"), {":15: contact.pressure_kPa", "did you mean 'pressure_Pa'?"});
+  require_parts(cell("[blood]"), {":12: blood", "coupling.scheme = \"force\""});
+  require_parts(message(flow + "\n[blood]\n"), {"blood", "there are no [[cells]] to measure"});
+  const auto blood = [&](const std::string& key) { return cell("[coupling]\nscheme = \"force\"\n[blood]\n" + key); };
+  REQUIRE(blood("sample_every_us = 10\nbins = 12\nlayer_window_um = 0.5") == "accepted");
+  require_parts(blood("bins = 1"), {":15: blood.bins = 1", "from 2 to 32"});
+  require_parts(blood("bins = 33"), {":15: blood.bins = 33", "from 2 to 32"});
+  require_parts(blood("sample_every_us = -1"), {":15: blood.sample_every_us = -1", "0"});
+  require_parts(blood("layer_window_um = 0"), {":15: blood.layer_window_um = 0", "from 0.1"});
+  require_parts(blood("from_us = 1e9"), {":15: blood.from_us", "time.end_us", "begin earlier"});
+  require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});
+  require_parts(message(flow + "\n[output]\nfields = [\"wall_stress\"]\n"), {"output.fields", "\"wall_shear_stress\""});
+  require_parts(cell("[output]\ncells_in_history = -1"), {":13: output.cells_in_history = -1", "from 0"});
   require_parts(cell("push_nN = [0, 0, 1]"), {":12: cells.0.push_nN", "coupling.scheme = \"force\""});
 
   const auto body = [](const std::string& text) {

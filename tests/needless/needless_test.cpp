@@ -31,6 +31,8 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
      {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
     {"contact", {"corpuscle::contact::"}},
+    {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
+                          "corpuscle::blood::wall_force", "corpuscle::blood::find_bins", "corpuscle::blood::edge"}},
     {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
                   "corpuscle::cells::measure_boxes"}},
     {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
@@ -204,6 +206,9 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   SECTION("straight tube, membranes as forces that touch") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "contact.range_um=0.25"}, 3);
   }
+  SECTION("straight tube, blood measured") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "blood.from_us=0"});
+  }
   SECTION("straight tube with two cells") { check_flow("straight_tube", {tube}, 10); }
   SECTION("straight tube, least of everything") {
     check_flow("straight_tube", {tube, "fluid.convection=false", "cells.0.membrane_viscosity_N_s_per_m=0",
@@ -213,6 +218,30 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
     check_flow("straight_tube", {tube, "coupling.scheme=iterated", "coupling.tolerance=0.01"});
   }
   SECTION("curved tube") { check_flow("curved_tube", {"grid.nodes=[17,17,31]"}); }
+}
+
+TEST_CASE("a sample of blood allocates nothing, and steps between samples launch nothing for it", "[needless]") {
+  const Case scene = small("straight_tube", {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "output.fields=false",
+                                             "output.cells=false", "output.history_every_us=1000", "blood.sample_every_us=4"});
+  const auto folder = std::filesystem::temp_directory_path() / ("corpuscle_needless_blood_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  FlowOutput output({folder.string(), [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
+  std::vector<int> launches;
+  Recorder recorder;
+  for (int n = 1; n <= 12; ++n) {
+    simulation.step();
+    recorder.start();
+    output.after_step();
+    recorder.stop();
+    launches.push_back(Recorder::matching(Recorder::kernels(), "corpuscle::blood::"));
+    INFO("step " << n);
+    if (n > 4) CHECK(Recorder::matching(Recorder::allocations(), "corpuscle::blood::") == 0);
+  }
+  std::filesystem::remove_all(folder);
+  CHECK(launches == std::vector<int>{0, 0, 0, launches[3], 0, 0, 0, launches[3], 0, 0, 0, launches[3]});
+  CHECK(launches[3] > 0);
 }
 
 TEST_CASE("the laws of a scene's cells cost one launch each, and nothing where there is one", "[needless]") {

@@ -91,6 +91,12 @@ def check_plot():
             check(result.returncode == 2 and len(lines) == 1 and all(part in lines[0] for part in parts),
                   f"exit code {result.returncode}, not one line with {parts}:\n{result.stdout}{result.stderr}")
 
+        blood = pathlib.Path(folder) / "blood"
+        words = ["run", str(ROOT / "cases/capsule_shear.toml"), "--out", str(blood)]
+        for setting in ("grid.nodes=[17,17,17]", "time.end_us=400", "cells.0.vertices=200", "blood.from_us=200", "output.fields=false"):
+            words += ["--set", setting]
+        check(start([os.environ["CORPUSCLE"], *words]).returncode == 0, "the run with [blood] failed")
+        check(start([*plot, str(blood)]).returncode == 0 and (blood / "blood.png").exists(), "samples of blood cannot be drawn")
         refuse(["cannot be made a folder"], "--out", str(run / "report.json" / "below"))
         refuse(["/proc/velocity.png", "cannot be written"], "--out", "/proc")
         history = run / "history.csv"

@@ -1,0 +1,275 @@
+#include "blood/blood_sampler.hpp"
+
+#include "blood/cell_flow.hpp"
+#include "blood/core_edge.hpp"
+#include "core/log.hpp"
+#include "core/units.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+/// What means are taken of; then the hematocrit of each bin, and then its velocity.
+enum Quantity { hematocrit, mean_speed, cell_speed, discharge, viscosity, layer, first_bin };
+
+const double unknown = std::nan("");
+
+/// A spacing or so wide, and as many as there is room for.
+int default_bins(const Case& scene, const GuidedFlow& flow, const Grid& grid) {
+  constexpr int least = 4;
+  if (flow.frame.tube()) return std::clamp(static_cast<int>(flow.frame.width / grid.mean_spacing()), least, most_bins);
+  int bins = scene.grid->nodes[flow.across] - 1;
+  while (bins > most_bins) bins = (bins + 1) / 2;
+  return std::max(bins, 1);
+}
+
+template <class View>
+void add_ranks(const Comm& comm, const View& host, std::vector<double>& values) {
+  values.assign(host.data(), host.data() + values.size());
+  comm.sum(values.data(), static_cast<int>(values.size()));
+}
+
+nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+
+}  // namespace
+
+BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
+    : simulation_(simulation), settings_(*scene.blood), boundaries_(scene.boundaries), flow_(find_guided_flow(scene, simulation.fluid())) {
+  if (flow_) frame_ = flow_->frame;
+  if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
+  bins_ = !frame_.guided() ? 0 : settings_.bins > 0 ? settings_.bins : default_bins(scene, *flow_, simulation.grid());
+  if (frame_.guided()) windows_ = std::max(1, static_cast<int>(std::lround(frame_.length / settings_.layer_window_um)));
+  means_ = RunningMeans(first_bin + 2 * bins_);
+  make_profile();
+  cell_totals_ = Array<double>("corpuscle::blood::cell_totals", CellFlowColumn::within + bins_);
+  cell_totals_host_ = HostCopy(cell_totals_);
+  cell_sums_.resize(cell_totals_.size());
+  if (windows_ > 0) {
+    edge_ = Table<double>(uninitialised("corpuscle::blood::edge"), windows_, view_count(frame_));
+    edge_host_ = HostCopy(edge_);
+  }
+}
+
+/// Owned cells by their bins; where the flow has no direction across, all in one.
+void BloodSampler::make_profile() {
+  const Grid& grid = simulation_.grid();
+  const IndexSpace& index = grid.index();
+  const int bins = std::max(bins_, 1), owned = index.owned();
+  const Array<int> bin(uninitialised("corpuscle::blood::bin"), owned);
+  const Array<double> across(uninitialised("corpuscle::blood::across"), owned);
+  find_bins(grid.views(), frame_, bins, bin, across);
+  const auto host_bin = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), bin);
+  const auto host_across = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), across);
+  const auto volume = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid.views().volume);
+  profile_.cell = Array<int>(uninitialised("corpuscle::blood::profile_cell"), owned);
+  profile_.start = Array<int>("corpuscle::blood::profile_start", bins + 1);
+  const auto cell = Kokkos::create_mirror_view(profile_.cell);
+  const auto start = Kokkos::create_mirror_view(profile_.start);
+  std::vector<double> sums(2 * bins, 0.0);
+  std::vector<int> next(bins + 1, 0);
+  for (int e = 0; e < owned; ++e) ++next[host_bin(e) + 1];
+  start(0) = 0;
+  for (int b = 0; b < bins; ++b) start(b + 1) = next[b + 1] += next[b];
+  for (int e = 0; e < owned; ++e) {
+    const int c = index.visit_compact(e, [&](int i, int j, int k) { return index.cell(i, j, k); });
+    cell(next[host_bin(e)]++) = c;
+    sums[2 * host_bin(e)] += volume(c);
+    sums[2 * host_bin(e) + 1] += volume(c) * host_across(e);
+  }
+  Kokkos::deep_copy(profile_.cell, cell);
+  Kokkos::deep_copy(profile_.start, start);
+  grid.comm().sum(sums.data(), static_cast<int>(sums.size()));
+  for (int b = 0; b < bins_; ++b) bin_place_.push_back(sums[2 * b] > 0 ? sums[2 * b + 1] / sums[2 * b] : unknown);
+  if (frame_.kind == FlowFrame::Kind::swept) {
+    profile_.direction = Components<double>(uninitialised("corpuscle::blood::direction"), owned, 3);
+    profile_.lengthening = Array<double>(uninitialised("corpuscle::blood::lengthening"), owned);
+    find_directions(grid.views(), frame_, profile_);
+  }
+  profile_parts_ = Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
+  profile_parts_host_ = HostCopy(profile_parts_);
+  profile_sums_.resize(bins * ProfileColumn::count);
+  // The share of the whole that a bin is, of the grid's volume: exact for tubes, bent ones too, and between walls.
+  for (int b = 0; b < bins_; ++b) {
+    const double inner = static_cast<double>(b) / bins_, outer = static_cast<double>(b + 1) / bins_;
+    bin_volume_.push_back(grid.total_volume() * (frame_.tube() ? outer * outer - inner * inner : outer - inner));
+  }
+}
+
+bool BloodSampler::due() const {
+  const double now = simulation_.time(), before = now - simulation_.last_step_us(), every = settings_.sample_every_us;
+  constexpr double rounding = 1e-9;
+  if (now < settings_.from_us * (1 - rounding)) return false;
+  return every <= 0 || std::floor(now / every + rounding) > std::floor(before / every + rounding);
+}
+
+/// Volumes and flows of the cells, of all ranks.
+void BloodSampler::measure_cells() {
+  const Membranes& membranes = *simulation_.membranes();
+  const int cells = membranes.cells();
+  if (const auto rows = static_cast<std::size_t>(cells) * sections; !cell_parts_.data() || cell_parts_.extent(0) < rows)
+    cell_parts_ = Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
+  sum_cell_flow(membranes.surfaces(), cells, frame_, bins_, cell_parts_, cell_totals_);
+  add_ranks(simulation_.grid().comm(), cell_totals_host_.read(), cell_sums_);
+}
+
+/// Volumes and velocities of the bins, of all ranks.
+void BloodSampler::measure_flow() {
+  const int bins = std::max(bins_, 1);
+  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins, profile_parts_);
+  const auto& parts = profile_parts_host_.read();
+  for (int b = 0; b < bins; ++b)
+    for (int q = 0; q < ProfileColumn::count; ++q) {
+      double& sum = profile_sums_[b * ProfileColumn::count + q];
+      sum = 0;
+      for (int s = 0; s < sections; ++s) sum += parts(b * sections + s, q);
+    }
+  simulation_.grid().comm().sum(profile_sums_.data(), static_cast<int>(profile_sums_.size()));
+}
+
+/// Between the wall and the outermost membrane in each window, seen from each side; the mean of all windows with a cell.
+void BloodSampler::measure_layer() {
+  const auto& set = simulation_.membranes()->surfaces();
+  find_core_edge(set, simulation_.membranes()->vertices(), frame_, windows_, edge_);
+  std::vector<double> edge(edge_.size());
+  const auto& host = edge_host_.read();
+  std::copy_n(host.data(), edge.size(), edge.begin());
+  simulation_.grid().comm().max(edge.data(), static_cast<int>(edge.size()));
+  double sum = 0;
+  long count = 0;
+  const int views = view_count(frame_);
+  for (std::size_t n = 0; n < edge.size(); ++n) {
+    if (edge[n] == nobody) continue;
+    const bool lower = !frame_.tube() && static_cast<int>(n) % views == 1;
+    sum += (lower ? 0 : frame_.width) - edge[n];
+    ++count;
+  }
+  last_.cell_free_layer_um = count > 0 ? sum / static_cast<double>(count) : unknown;
+}
+
+/// Stress on the walls over that of plasma at the same shear rate.
+double BloodSampler::wall_viscosity() {
+  const FluidSolver& fluid = simulation_.fluid();
+  Grid& grid = simulation_.grid();
+  const int d = flow_->across;
+  double sums[4] = {};
+  Vec3 velocity[2];
+  for (int end = 0; end < 2; ++end) {
+    const BoundarySettings& wall = boundaries_[flow_->wall[end]];
+    const double factor = wall.velocity ? time_factor(wall, simulation_.time()) : 0;
+    for (int m = 0; m < 3; ++m) velocity[end][m] = wall.velocity ? factor * (*wall.velocity)[m] : 0;
+    if (grid.halo().neighbour(d, end) >= 0) continue;
+    const auto force_on = fluid.skewed() ? wall_force<true> : wall_force<false>;
+    const auto side = force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
+    sums[2 * end] = side[0], sums[2 * end + 1] = side[1];
+  }
+  grid.comm().sum(sums, 4);
+  const double rate = dot(velocity[1] - velocity[0], frame_.tangent) / frame_.width;
+  const double stress = 0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
+  return rate != 0 ? stress / (fluid.viscosity() * rate) : unknown;
+}
+
+const BloodSample& BloodSampler::sample() {
+  using Cells = CellFlowColumn;
+  measure_cells();
+  measure_flow();
+  last_ = {};
+  last_.time_us = simulation_.time();
+  const double volume = cell_sums_[Cells::volume];
+  last_.hematocrit = volume / simulation_.grid().total_volume();
+  double fluid_volume = 0, flow = 0;
+  for (std::size_t b = 0; b < profile_sums_.size(); b += ProfileColumn::count)
+    fluid_volume += profile_sums_[b + ProfileColumn::volume], flow += profile_sums_[b + ProfileColumn::flow];
+  const bool driven = flow_ && flow_->driven;
+  last_.mean_speed = driven ? flow / fluid_volume : unknown;
+  last_.cell_speed = driven ? cell_sums_[Cells::flow] / volume : unknown;
+  last_.discharge_hematocrit = last_.hematocrit * last_.cell_speed / last_.mean_speed;
+  last_.relative_viscosity = unknown;
+  if (plasma_speed_ != 0) last_.relative_viscosity = plasma_speed_ / last_.mean_speed;
+  if (flow_ && flow_->sheared && frame_.guided()) last_.relative_viscosity = wall_viscosity();
+  last_.cell_free_layer_um = unknown;
+  if (windows_ > 0) measure_layer();
+  std::vector<double> values{last_.hematocrit, last_.mean_speed, last_.cell_speed, last_.discharge_hematocrit, last_.relative_viscosity,
+                             last_.cell_free_layer_um};
+  for (int b = 0; b < bins_; ++b)
+    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) / bin_volume_[b]);
+  for (int b = 0; b < bins_; ++b) {
+    const double* sums = profile_sums_.data() + b * ProfileColumn::count;
+    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume] : unknown);
+  }
+  means_.add(values);
+  return last_;
+}
+
+/// Why a figure is missing, and how those that are there were found.
+void BloodSampler::add_notes(nlohmann::json& block) const {
+  auto& missing = block["left_out"] = nlohmann::json::object();
+  const auto leave = [&](const char* name, const std::string& why) {
+    if (!block.contains(name)) missing[name] = why;
+  };
+  if (samples() == 0) {
+    missing["all"] = "nothing was sampled: the run ended before blood.from_us";
+    return;
+  }
+  const std::string no_flow = "no flow is driven through the grid in one direction";
+  leave("discharge_hematocrit", no_flow);
+  leave("mean_speed_mm_per_s", no_flow);
+  leave("cell_speed_mm_per_s", no_flow);
+  leave("relative_apparent_viscosity", flow_ ? flow_->no_viscosity : no_flow);
+  leave("cell_free_layer_um", "the flow has no walls to the sides");
+  leave("smallest_gap_um", "there is no [contact], or nothing came near");
+  leave("crossings", "there is no [contact]");
+  if (missing.empty()) block.erase("left_out");
+}
+
+nlohmann::json BloodSampler::report() const {
+  nlohmann::json block;
+  block["cells"] = simulation_.cells();
+  block["from_us"] = settings_.from_us;
+  block["samples"] = samples();
+  if (samples() == 0) return block;
+  const auto put = [&](const std::string& name, double value) {
+    if (std::isfinite(value)) block[name] = value;
+  };
+  const auto put_with_error = [&](const std::string& name, const std::string& unit, double value, double error) {
+    put(name + unit, value);
+    if (std::isfinite(value)) block[name + "_error" + unit] = number(error);
+  };
+  const double speed = means_.mean(mean_speed), cells = means_.mean(cell_speed), share = means_.mean(hematocrit);
+  put("tube_hematocrit", share);
+  put_with_error("mean_speed", "_mm_per_s", speed / units::mm_per_s, means_.error(mean_speed) / units::mm_per_s);
+  put_with_error("cell_speed", "_mm_per_s", cells / units::mm_per_s, means_.error(cell_speed) / units::mm_per_s);
+  put_with_error("discharge_hematocrit", "", share * cells / speed, means_.error(discharge));
+  if (plasma_speed_ != 0)
+    put_with_error("relative_apparent_viscosity", "", plasma_speed_ / speed,
+                   std::abs(plasma_speed_ / (speed * speed)) * means_.error(mean_speed));
+  else
+    put_with_error("relative_apparent_viscosity", "", means_.mean(viscosity), means_.error(viscosity));
+  if (plasma_speed_ != 0) block["plasma_mean_speed_mm_per_s"] = plasma_speed_ / units::mm_per_s;
+  put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
+  return block;
+}
+
+BloodSampler::Profile BloodSampler::profile() const {
+  Profile profile;
+  if (bins_ == 0) return profile;
+  for (int b = 0; b <= bins_; ++b) profile.edge_um.push_back(frame_.width * b / bins_);
+  profile.velocity_um = bin_place_;
+  for (int b = 0; b < bins_; ++b) {
+    const int share = first_bin + b, speed = first_bin + bins_ + b;
+    profile.hematocrit.push_back(means_.mean(share));
+    profile.hematocrit_error.push_back(means_.error(share));
+    profile.velocity_mm_per_s.push_back(means_.mean(speed) / units::mm_per_s);
+    profile.velocity_error_mm_per_s.push_back(means_.error(speed) / units::mm_per_s);
+  }
+  return profile;
+}
+
+void BloodSampler::resume(const std::vector<double>& state) {
+  if (state.empty() || means_.set_state(state)) return;
+  warn("blood: what was sampled until the checkpoint is of other bins: sampling begins anew");
+}
+
+}  // namespace corpuscle

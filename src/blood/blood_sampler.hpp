@@ -1,0 +1,75 @@
+// [blood]: what blood people measure of many cells in a flow, as means over time with standard errors.
+#pragma once
+
+#include "blood/flow_profile.hpp"
+#include "blood/guided_flow.hpp"
+#include "blood/running_means.hpp"
+#include "coupling/flow_simulation.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace corpuscle {
+
+/// What one sample found; not a number where it has no meaning.
+struct BloodSample {
+  double time_us = 0;
+  double hematocrit = 0;
+  double mean_speed = 0, cell_speed = 0;  // um/us
+  double discharge_hematocrit = 0, relative_viscosity = 0;
+  double cell_free_layer_um = 0;
+};
+
+class BloodSampler {
+ public:
+  BloodSampler(const Case& scene, FlowSimulation& simulation);
+
+  /// Whether a sample is due at the end of this step.
+  bool due() const;
+  /// Every rank calls. Kernels, and no allocation but for more cells than before.
+  const BloodSample& sample();
+
+  /// The report's "blood", and why figures are missing there once all are in it.
+  nlohmann::json report() const;
+  void add_notes(nlohmann::json& block) const;
+  /// Across the flow, bin by bin.
+  struct Profile {
+    std::vector<double> edge_um;      // [bins + 1] distance from the centreline, or from the lower wall
+    std::vector<double> velocity_um;  // [bins] where the grid cells are, whose mean a bin's velocity is
+    std::vector<double> hematocrit, hematocrit_error, velocity_mm_per_s, velocity_error_mm_per_s;
+  };
+  /// Empty where the flow has no walls.
+  Profile profile() const;
+  long samples() const { return means_.samples(); }
+  bool tube() const { return frame_.tube(); }
+
+  /// For checkpoints, the same on all ranks.
+  std::vector<double> state() const { return means_.state(); }
+  /// What was sampled before, unless it was of other settings: then a warning, and sampling begins anew.
+  void resume(const std::vector<double>& state);
+
+ private:
+  void make_profile();
+  void measure_cells();
+  void measure_flow();
+  void measure_layer();
+  double wall_viscosity();
+
+  FlowSimulation& simulation_;
+  BloodSettings settings_;
+  std::vector<BoundarySettings> boundaries_;
+  std::optional<GuidedFlow> flow_;
+  FlowFrame frame_;
+  double plasma_speed_ = 0;  // um/us; 0: not known
+  int bins_ = 0, windows_ = 0;
+  ProfileViews profile_;
+  std::vector<double> bin_volume_, bin_place_;  // um3, um
+  Table<double> cell_parts_, profile_parts_, edge_;
+  Array<double> cell_totals_;
+  HostCopy<Array<double>> cell_totals_host_;
+  HostCopy<Table<double>> profile_parts_host_, edge_host_;
+  std::vector<double> cell_sums_, profile_sums_;  // of all ranks
+  BloodSample last_;
+  RunningMeans means_;
+};
+
+}  // namespace corpuscle

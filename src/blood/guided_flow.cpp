@@ -1,0 +1,207 @@
+#include "blood/guided_flow.hpp"
+
+#include "fluid/flow_balances.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace corpuscle {
+
+namespace {
+
+using Type = BoundarySettings::Type;
+using Generator = GridSettings::Generator;
+
+Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
+
+bool is_wall(const BoundarySettings& side) { return side.type == Type::wall || side.type == Type::moving_wall; }
+
+const BoundarySettings& side_of(const Case& scene, int number) {
+  return *std::find_if(scene.boundaries.begin(), scene.boundaries.end(),
+                       [&](const BoundarySettings& b) { return static_cast<int>(b.side) == number; });
+}
+
+int entry_of(const Case& scene, int number) { return static_cast<int>(&side_of(scene, number) - scene.boundaries.data()); }
+
+/// A unit vector across another.
+Vec3 any_across(const Vec3& a) {
+  const Vec3 helper = std::abs(a.x) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  const Vec3 b = helper - dot(helper, a) * a;
+  return (1 / norm(b)) * b;
+}
+
+void complete(FlowFrame& frame) { frame.binormal = cross(frame.tangent, frame.normal); }
+
+/// The centreline as the grid was made from it.
+void set_line(const GridSettings& grid, FlowFrame& frame) {
+  const Centerline line(grid);
+  constexpr int most = 4000;  // as finely as Centerline has it
+  frame.length = line.length();
+  frame.stations = std::clamp(static_cast<int>(200 * frame.length / frame.width), 200, most) + 1;
+  frame.spacing = frame.length / (frame.stations - 1);
+  frame.stride = std::max(1, static_cast<int>(0.5 * frame.width / frame.spacing));
+  frame.line = Table<double>(uninitialised("corpuscle::blood::line"), frame.stations, LineColumn::count);
+  const auto host = Kokkos::create_mirror_view(frame.line);
+  const auto put = [&](int s, int column, const Triple& a) {
+    for (int d = 0; d < 3; ++d) host(s, column + d) = a[d];
+  };
+  for (int s = 0; s < frame.stations; ++s) {
+    const auto at = line.at(s * frame.spacing);
+    put(s, LineColumn::position, at.position);
+    put(s, LineColumn::tangent, at.tangent);
+    put(s, LineColumn::normal, at.normal);
+    put(s, LineColumn::binormal, at.binormal);
+  }
+  for (int s = 0; s < frame.stations; ++s) {
+    const int low = std::max(s - 1, 0), high = std::min(s + 1, frame.stations - 1);
+    for (int d = 0; d < 3; ++d)
+      host(s, LineColumn::curvature + d) =
+          (host(high, LineColumn::tangent + d) - host(low, LineColumn::tangent + d)) / ((high - low) * frame.spacing);
+  }
+  Kokkos::deep_copy(frame.line, host);
+}
+
+GuidedFlow tube_flow(const Case& scene, FluidSolver& fluid) {
+  const GridSettings& grid = *scene.grid;
+  GuidedFlow flow;
+  FlowFrame& frame = flow.frame;
+  frame.width = 0.5 * grid.diameter_um;
+  frame.periodic = side_of(scene, 4).type == Type::periodic;
+  if (frame.periodic) frame.period = to_vec3(fluid.grid().period(2));
+  if (grid.generator == Generator::straight_tube) {
+    frame.kind = FlowFrame::Kind::straight;
+    frame.length = grid.length_um;
+    frame.origin = {0, 0, -0.5 * grid.length_um};
+    frame.tangent = frame.station_axis = {0, 0, 1};
+    frame.normal = {1, 0, 0};
+    complete(frame);
+  } else {
+    frame.kind = FlowFrame::Kind::swept;
+    set_line(grid, frame);
+  }
+  const double gradient = -fluid.imposed_gradient().z;
+  const bool still = std::none_of(scene.boundaries.begin(), scene.boundaries.end(),
+                                  [](const BoundarySettings& b) { return b.type == Type::moving_wall; });
+  flow.driven = still && (norm(fluid.imposed_gradient()) > 0 || !frame.periodic);
+  if (frame.kind == FlowFrame::Kind::swept)
+    flow.no_viscosity = "what plasma alone does in a bent tube is not known";
+  else if (!frame.periodic)
+    flow.no_viscosity = "the pressure drop of a tube with an inlet has the inlet's own in it: make both ends periodic";
+  else if (gradient == 0)
+    flow.no_viscosity = "no pressure gradient is imposed";
+  else if (!still)
+    flow.no_viscosity = "the tube's wall moves";
+  else
+    flow.gradient = gradient;
+  return flow;
+}
+
+/// Along which a pressure gradient or an inlet drives the fluid in a box, less what is across; zero if none does.
+Vec3 drive(const Case& scene, const FluidSolver& fluid, const Vec3& across) {
+  Vec3 down = -fluid.imposed_gradient();
+  down -= dot(down, across) * across;
+  for (int s = 0; s < 6; ++s)
+    if (side_of(scene, s).type == Type::velocity_inlet && norm(down) == 0) down[s / 2] = s % 2 == 0 ? 1 : -1;
+  return down;
+}
+
+/// By how much the upper wall is faster than the lower one, along both.
+Vec3 shear_of_walls(const Case& scene, int d) {
+  const auto velocity = [&](int end) { return to_vec3(side_of(scene, 2 * d + end).velocity.value_or(Triple{})); };
+  Vec3 shear = velocity(1) - velocity(0);
+  shear[d] = 0;
+  return shear;
+}
+
+std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
+  int pairs = 0, d = -1, walls = 0;
+  for (int e = 0; e < 3; ++e) {
+    const bool low = is_wall(side_of(scene, 2 * e)), high = is_wall(side_of(scene, 2 * e + 1));
+    walls += low + high;
+    if (low && high) ++pairs, d = e;
+  }
+  if (walls > 0 && (pairs != 1 || walls != 2)) return std::nullopt;  // ducts and boxes with a lid have no one direction across
+  GuidedFlow flow;
+  FlowFrame& frame = flow.frame;
+  const Triple &lower = scene.grid->lower_um, &upper = scene.grid->upper_um;
+  frame.origin = to_vec3(lower);
+  if (walls > 0) frame.normal[d] = 1;
+  const Vec3 shear = walls > 0 ? shear_of_walls(scene, d) : Vec3{}, down = drive(scene, fluid, frame.normal);
+  if (norm(shear) == 0 && norm(down) == 0) return std::nullopt;
+  const Vec3 along = norm(shear) > 0 ? shear : down;
+  frame.tangent = (1 / norm(along)) * along;
+  flow.driven = norm(down) > 0 && norm(shear) == 0;
+  flow.sheared = norm(shear) > 0 && norm(down) == 0;
+  int axis = 0;
+  for (int e = 1; e < 3; ++e)
+    if (std::abs(frame.tangent[e]) > std::abs(frame.tangent[axis])) axis = e;
+  frame.station_axis[axis] = 1;
+  frame.length = upper[axis] - lower[axis];
+  frame.periodic = fluid.grid().index().periodic[axis];
+  if (walls == 0) {
+    frame.normal = any_across(frame.tangent);
+    flow.no_viscosity = "there are no walls";
+  } else {
+    frame.kind = FlowFrame::Kind::slit;
+    frame.width = upper[d] - lower[d];
+    flow.across = d;
+    for (int end = 0; end < 2; ++end) flow.wall[end] = entry_of(scene, 2 * d + end);
+    const double gradient = -dot(fluid.imposed_gradient(), frame.tangent);
+    if (flow.driven && gradient > 0)
+      flow.gradient = gradient;
+    else if (!flow.sheared)
+      flow.no_viscosity = flow.driven ? "no pressure gradient is imposed" : "both moving walls and a pressure gradient drive the flow";
+  }
+  complete(frame);
+  return flow;
+}
+
+}  // namespace
+
+std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid) {
+  if (!scene.grid || scene.boundaries.size() != 6) return std::nullopt;
+  switch (scene.grid->generator) {
+    case Generator::box: return box_flow(scene, fluid);
+    case Generator::straight_tube:
+    case Generator::swept_tube: return tube_flow(scene, fluid);
+    case Generator::file: break;
+  }
+  return std::nullopt;
+}
+
+double plasma_speed(const Case& scene, const GuidedFlow& flow) {
+  constexpr int along = 4, steps = 5;
+  GridSettings piece = *scene.grid;
+  std::array<bool, 3> periodic{};
+  for (int d = 0; d < 3; ++d) {
+    periodic[d] = side_of(scene, 2 * d).type == Type::periodic;
+    if (d == flow.across || (flow.frame.tube() && d < 2)) continue;
+    const double share = static_cast<double>(along) / (piece.nodes[d] - 1);
+    piece.nodes[d] = along + 1;
+    if (flow.frame.tube())
+      piece.length_um *= share;
+    else
+      piece.upper_um[d] = piece.lower_um[d] + share * (piece.upper_um[d] - piece.lower_um[d]);
+  }
+  FluidSettings settings = *scene.fluid;
+  settings.convection = FluidSettings::Convection::none;
+  settings.momentum_tolerance = std::min(settings.momentum_tolerance, 1e-10);
+  Grid grid(Comm::alone(), make_node_source(piece), periodic);
+  FluidSolver fluid(grid, settings, scene.boundaries, &piece);
+  const double decay = settings.density_pg_per_um3 * flow.frame.width * flow.frame.width / fluid.viscosity();
+  for (int n = 1; n <= steps; ++n) {
+    fluid.begin_step(100 * decay);  // leaves less than a hundredth of what was unsteady, each time
+    fluid.solve(n * 100 * decay, nullptr);
+  }
+  const Triple mean = mean_velocity(fluid);
+  return dot(to_vec3(mean), flow.frame.tangent);
+}
+
+void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid, const Components<double>& stress) {
+  WallSides sides;
+  for (const auto& side : boundaries) sides.wall[static_cast<int>(side.side) / 2][static_cast<int>(side.side) % 2] = is_wall(side);
+  const auto find = fluid.skewed() ? wall_stress_field<true> : wall_stress_field<false>;
+  find(fluid.grid().views(), fluid.coefficients(), sides, fluid.viscosity(), fluid.velocity(), stress);
+}
+
+}  // namespace corpuscle

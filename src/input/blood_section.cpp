@@ -1,0 +1,21 @@
+// [blood].
+#include "input/sections.hpp"
+
+namespace corpuscle {
+
+BloodSettings read_blood(Section& s) {
+  constexpr int least_bins = 2, most_bins = 32;
+  constexpr double least_um = 0.1;
+  BloodSettings b;
+  b.from_us = s.number("from_us", not_negative(), b.from_us);
+  b.sample_every_us = s.number("sample_every_us", not_negative(), b.sample_every_us);
+  if (s.node("bins"))
+    b.bins = s.integer("bins", least_bins, most_bins);
+  else
+    s.describe("bins", "a whole number from 2 to 32", "about a grid spacing each");
+  b.layer_window_um = s.number("layer_window_um", between(least_um, most_um), b.layer_window_um);
+  s.finish();
+  return b;
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,145 @@
+// What is measured of blood, in the files of a run.
+#include <cmath>
+#include <fstream>
+
+#include "program.hpp"
+
+using namespace app;
+
+namespace {
+
+/// Small capsules, in rows, in a flow aslant between resting walls, or one driven by walls alone.
+fs::path write_case(const fs::path& folder, const std::string& name, bool sheared, int cells = 18) {
+  std::ofstream out(folder / (name + ".toml"));
+  out << "[time]\nstep_us = 10\nend_us = 80\n"
+         "[grid]\ngenerator = \"box\"\nnodes = [25, 9, 13]\nlower_um = [0, 0, 0]\nupper_um = [12, 4, 6]\n"
+         "[fluid]\nconvection = false\nmomentum_tolerance = 1e-12\ndivergence_tolerance = 1e-13\n";
+  if (!sheared) out << "pressure_gradient_Pa_per_um = [-6, 0, -2]\n";
+  for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"}) {
+    const bool wall = side[0] == 'j', moves = wall && sheared;
+    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"" << (moves ? "moving_wall" : wall ? "wall" : "periodic") << "\"\n";
+    if (moves) out << "velocity_mm_per_s = [" << (side[2] == 'm' && side[3] == 'i' ? -4 : 4) << ", 0, 0]\n";
+  }
+  out << "[[cell_types]]\nname = \"large\"\nshape = \"sphere\"\nradius_um = 0.75\nvertices = 60\nlaw = \"neo-hookean\"\n"
+         "[[cell_types]]\nname = \"small\"\nshape = \"sphere\"\nradius_um = 0.65\nvertices = 50\nlaw = \"neo-hookean\"\n";
+  for (int n = 0; n < cells; ++n)
+    out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6) << ", "
+        << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
+  out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.1\n[blood]\nfrom_us = 20\n"
+         "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\n";
+  return folder / (name + ".toml");
+}
+
+/// The largest difference of the numbers of two tables, over what is largest in their column.
+double largest_difference(const fs::path& a, const fs::path& b) {
+  std::ifstream first(a), second(b);
+  std::string one, two;
+  double most = 0;
+  std::getline(first, one), std::getline(second, two);
+  CHECK(one == two);
+  while (std::getline(first, one)) {
+    REQUIRE(std::getline(second, two));
+    const auto x = split(one), y = split(two);
+    REQUIRE(x.size() == y.size());
+    for (std::size_t n = 0; n < x.size(); ++n) {
+      REQUIRE(x[n].empty() == y[n].empty());
+      if (!x[n].empty()) most = std::max(most, std::abs(std::stod(x[n]) - std::stod(y[n])) / (1e-12 + std::abs(std::stod(x[n]))));
+    }
+  }
+  CHECK_FALSE(std::getline(second, two));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("blood between walls: the report, its samples and profiles, on any ranks and after a restart") {
+  const auto folder = fresh_folder("blood");
+  const std::string name = write_case(folder, "driven", false).string();
+  succeed(folder, {"run", name, "--out", "one"}, {1, 1});
+  const auto blood = report(folder / "one")["blood"];
+  INFO(blood.dump(1));
+  CHECK(blood["cells"] == 18);
+  CHECK(blood["samples"] == 7);  // at 20, 30, ... 80 us
+  CHECK(blood["crossings"] == 0);
+  const double share = blood["tube_hematocrit"];
+  CHECK(share == Approx((6 * std::pow(0.75, 3) + 12 * std::pow(0.65, 3)) * 4 * M_PI / 3 / (12 * 4 * 6)).epsilon(0.12));  // coarse meshes
+  const double speed = blood["mean_speed_mm_per_s"], cells = blood["cell_speed_mm_per_s"];
+  CHECK(cells / speed == Approx(1.5 * 0.75).epsilon(0.1));  // of a parabola, half way from the middle to the wall
+  CHECK(blood["discharge_hematocrit"].get<double>() == Approx(share * cells / speed).epsilon(1e-12));
+  CHECK(blood["relative_apparent_viscosity"].get<double>() > 1);
+  CHECK(blood["relative_apparent_viscosity"].get<double>() < 1.3);
+  CHECK(blood["plasma_mean_speed_mm_per_s"].get<double>() == Approx(std::hypot(6, 2) * 16 / (12 * 1.1)).epsilon(0.04));  // 2 over the cells across, squared
+  CHECK(blood["relative_apparent_viscosity_error"].is_null());  // of seven samples none is told
+  CHECK(blood["cell_free_layer_um"].get<double>() == Approx(0.3).margin(0.1));
+  CHECK(blood["cell_free_layer_um"].get<double>() > 0);
+#ifdef CORPUSCLE_HDF5
+  const auto profile = data_set(folder / "one/blood.h5", "profile/hematocrit");
+  const auto velocity = data_set(folder / "one/blood.h5", "profile/velocity_mm_per_s");
+  REQUIRE(profile.size() == 8);
+  double mean = 0, flow = 0;
+  for (std::size_t b = 0; b < 8; ++b) mean += profile[b] / 8, flow += velocity[b] / 8;
+  CHECK(mean == Approx(share).epsilon(1e-9));
+  CHECK(flow == Approx(speed).epsilon(1e-9));
+  CHECK(profile[0] < 0.3 * share);
+  // The wall holds what the gradient drives, but for what is still speeding up.
+  const auto stress = data_set(folder / "one/fields.h5", "step_000000008/wall_shear_stress_Pa");
+  REQUIRE(stress.size() == 3 * 24 * 8 * 12);
+  const double gradient[3] = {6, 0, 2};
+  for (int d = 0; d < 3; ++d) {
+    double force = 0;
+    for (int k = 0; k < 12; ++k)
+      for (int i = 0; i < 24; ++i)
+        for (int j : {0, 7}) force += 0.25 * stress[3 * (i + 24 * (j + 8 * k)) + d];
+    CHECK(force == Approx(gradient[d] * 12 * 4 * 6).epsilon(0.03).margin(1));
+    for (int j = 1; j < 7; ++j) CHECK(stress[3 * (5 + 24 * (j + 8 * 3)) + d] == 0);
+  }
+  // Of many cells each one's shape is with its other figures.
+  CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/deformation").size() == 18);
+  CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/tank_treading_deg").size() == 18);
+#ifdef CORPUSCLE_MPI
+  for (int ranks : {2, 4}) {
+    const std::string out = "on_" + std::to_string(ranks);
+    succeed(folder, {"run", name, "--out", out}, {1, ranks});
+    INFO(out);
+    CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") < 1e-8);  // round-off, grown over eight steps
+  }
+#endif
+  // Stopped at 40 us and gone on from there: the same bits.
+  succeed(folder, {"run", name, "--out", "parts", "--set", "time.end_us=40"}, {1, 1});
+  succeed(folder, {"run", name, "--out", "parts", "--restart", "parts/checkpoint.h5"}, {1, 1});
+  CHECK(contents(folder / "parts/blood.csv") == contents(folder / "one/blood.csv"));
+  CHECK(report(folder / "parts")["blood"] == blood);
+  for (const char* set : {"hematocrit", "velocity_mm_per_s"})
+    CHECK(data_set(folder / "parts/blood.h5", std::string("profile/") + set) == data_set(folder / "one/blood.h5", std::string("profile/") + set));
+  // Other bins cannot go on from what was sampled; sampling begins anew, and says so.
+  const auto anew = succeed(folder, {"run", name, "--out", "anew", "--restart", "parts/checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"}, {1, 1});
+  CHECK_THAT(anew.output, Catch::Contains("sampling begins anew"));
+  CHECK(report(folder / "anew")["blood"]["samples"] == 2);
+#endif
+}
+
+TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is left out") {
+  const auto folder = fresh_folder("viscometer");
+  const std::string name = write_case(folder, "sheared", true, 2).string();
+  succeed(folder, {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.end_us=200", "--set", "output.every_us=200"}, {1, 1});
+  const auto blood = report(folder / "run")["blood"];
+  INFO(blood.dump(1));
+  // 0.9 % of nearly round capsules: Einstein's 1 + 2.5 of it, which walls so near may double.
+  const double share = blood["tube_hematocrit"], viscosity = blood["relative_apparent_viscosity"];
+  CHECK(share == Approx(0.01).epsilon(0.2));
+  CHECK(viscosity > 1 + 0.5 * share);
+  CHECK(viscosity < 1 + 6 * share);
+  CHECK(std::isfinite(blood["relative_apparent_viscosity_error"].get<double>()));  // of 20 samples
+  for (const char* missing : {"discharge_hematocrit", "mean_speed_mm_per_s", "cell_speed_mm_per_s"}) {
+    CHECK_FALSE(blood.contains(missing));
+    CHECK_THAT(blood["left_out"][missing].get<std::string>(), Catch::Contains("no flow is driven"));
+  }
+  CHECK(blood.contains("cell_free_layer_um"));
+  const auto lines = history(folder / "run");
+  for (const char* column : {"deformation", "inclination_deg", "membrane_angle_deg", "tank_treading_deg"})
+    CHECK(std::isfinite(lines.number(lines.lines.size() - 1, column)));
+  // Stretched towards half a right angle, and turned with the flow, against the sense of the angles.
+  CHECK(lines.number(lines.lines.size() - 1, "inclination_deg") > 20);
+  CHECK(lines.number(lines.lines.size() - 1, "inclination_deg") < 50);
+  CHECK(lines.number(lines.lines.size() - 1, "membrane_angle_deg") < lines.number(0, "membrane_angle_deg"));
+}

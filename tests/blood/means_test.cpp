@@ -1,0 +1,67 @@
+// Standard errors of correlated samples.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "blood/running_means.hpp"
+
+using namespace corpuscle;
+
+namespace {
+
+/// Samples of which each remembers the share `memory` of the one before, of variance one, around 10; and a constant.
+RunningMeans sampled(double memory, int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  RunningMeans means(3);
+  double x = normal(random);
+  for (int n = 0; n < count; ++n) {
+    means.add({10 + x, 7, std::nan("")});
+    x = memory * x + std::sqrt(1 - memory * memory) * normal(random);
+  }
+  return means;
+}
+
+}  // namespace
+
+TEST_CASE("standard errors are those of correlated samples", "[blood]") {
+  for (const double memory : {0.0, 0.8, 0.95}) {
+    // Over many series the mean's spread is what the error says, not the smaller one of samples that know nothing of each other.
+    constexpr int series = 40, count = 16000;
+    double spread = 0, error = 0;
+    for (int s = 0; s < series; ++s) {
+      const auto means = sampled(memory, count, 100 + s);
+      spread += std::pow(means.mean(0) - 10, 2) / series;
+      error += means.error(0) / series;
+    }
+    const double exact = std::sqrt((1 + memory) / (1 - memory) / count);
+    INFO("memory " << memory << ": exact " << exact << ", told " << error << ", seen " << std::sqrt(spread));
+    CHECK(error > 0.9 * exact);
+    CHECK(error < 1.5 * exact);  // the largest of several estimates: a little high
+    CHECK(std::sqrt(spread) == Approx(exact).epsilon(0.35));
+  }
+}
+
+TEST_CASE("means know what they do not know, and go on from a state", "[blood]") {
+  const auto few = sampled(0, 15, 3);
+  CHECK(std::isfinite(few.mean(0)));
+  CHECK(std::isnan(few.error(0)));
+  CHECK(std::isnan(RunningMeans(1).mean(0)));
+  const auto all = sampled(0.8, 100, 3);
+  CHECK(all.samples() == 100);
+  CHECK(all.mean(1) == 7);
+  CHECK(all.error(1) == 0);
+  CHECK(std::isnan(all.mean(2)));
+  CHECK(std::isnan(all.error(2)));
+  RunningMeans again(3);
+  REQUIRE(again.set_state(all.state()));
+  RunningMeans went_on = all;
+  for (int n = 0; n < 37; ++n)
+    for (auto* means : {&again, &went_on}) means->add({std::sin(n), n * 0.1, 1});
+  CHECK(again.mean(0) == went_on.mean(0));
+  CHECK(again.error(0) == went_on.error(0));
+  CHECK(again.samples() == 137);
+  RunningMeans other(4);
+  CHECK_FALSE(other.set_state(all.state()));
+  CHECK(other.samples() == 0);
+}
