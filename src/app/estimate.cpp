@@ -52,7 +52,9 @@ void sample_grid(const GridSettings& settings, SceneSize& size) {
 #else
     const Comm alone;
 #endif
-    size.skewed = !Grid(alone, source, size.periodic).orthogonal();
+    const Grid coarse(alone, source, size.periodic);
+    size.skewed = !coarse.orthogonal();
+    size.volume = coarse.total_volume();
   } catch (const InputError&) {
     // Folded, perhaps since it is coarse; if not, the grid itself says so when it is built.
   }
@@ -99,6 +101,21 @@ double vertices_of(const BodySettings& body, const SceneSize& size) {
   return std::clamp(4 * std::acos(-1.0) * largest * largest / (0.87 * h2), 162.0, 100000.0);
 }
 
+/// About, um3.
+double volume_of(const CellSettings& cell) {
+  const double ball = 4.0 / 3 * std::acos(-1.0);
+  if (cell.mesh.empty() && cell.shape == CellSettings::Shape::sphere) return ball * std::pow(cell.radius_um, 3);
+  if (cell.mesh.empty() && cell.shape == CellSettings::Shape::ellipsoid)
+    return ball * cell.semi_axes_um[0] * cell.semi_axes_um[1] * cell.semi_axes_um[2];
+  return 94 * std::pow(cell.diameter_um / 7.82, 3);
+}
+
+double vertices_of(const PopulationSettings& population, const Case& scene, const SceneSize& size) {
+  const CellSettings& cell = scene.cell_types[population.type].cell;
+  const double cells = population.count > 0 ? population.count : population.hematocrit * size.volume / volume_of(cell);
+  return cells * (cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh));
+}
+
 /// Cells of all multigrid levels over those of the finest, halos included; `coarsest`: of the last one.
 /// The same choices as MultigridHierarchy's, on mean spacings.
 double levels_over_finest(const SceneSize& size) {
@@ -139,12 +156,13 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   SceneSize size;
   if (scene.grid) measure_grid(scene, ranks, size);
   for (const auto& cell : scene.cells) size.vertices += cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh);
+  for (const auto& population : scene.populations) size.vertices += vertices_of(population, scene, size);
   for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
   return size;
 }
 
 MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ranks) {
-  const bool surfaces = !scene.cells.empty() || !scene.bodies.empty();
+  const bool surfaces = scene.has_cells() || !scene.bodies.empty();
   const bool convective = scene.fluid && scene.fluid->convection != FluidSettings::Convection::none;
   const double nodes = size.padded(), owned = size.owned();
   // Bytes of each array of a node, of the classes named; doubles are 8, vectors of the cycles 12.

@@ -60,6 +60,7 @@ class FlowOutput {
   void fill_quantities(Report& report) const;
   void judge_figures(Report& report) const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
+  Triple axis_at_start(int number) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
   void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
   void gather_samples();

@@ -4,6 +4,7 @@
 #include "cells/shared_cells.hpp"
 #include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
+#include "populations/populations.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -11,7 +12,7 @@ namespace corpuscle {
 
 class ForceCoupling : public Coupling {
  public:
-  ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers);
+  ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers, const PackedCells* packed);
 
   void check_start() override;
   /// Forces at the present shape, one fluid solve with them, and a step with the velocity that the fluid has then.
@@ -41,8 +42,12 @@ class ForceCoupling : public Coupling {
   SharedCells* shared_cells() override { return cells_.get(); }
   int cells() override { return cells_->total(); }
   long vertices() override { return cells_->total_vertices(); }
+  const PackingReport* packing() const override { return packing_ ? &*packing_ : nullptr; }
+  const PackedShare* packed() const override { return packed_ ? &*packed_ : nullptr; }
 
  private:
+  void take_places(const Case& scene, const PackedCells* packed);
+  void check_packing();
   void place(double time_us);
   void take_up();
   void watch_outflow();
@@ -65,6 +70,9 @@ class ForceCoupling : public Coupling {
   std::vector<double> lengths_us_;  // of all steps there will be
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
+  std::optional<PackingReport> packing_;  // only with populations
+  std::optional<PackedShare> packed_;
+  double packed_gap_ = 0;                 // um, the least of the populations'
   Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace

@@ -77,6 +77,9 @@ class Membranes {
   const MembraneLaw& law(int cell) const { return law_[cell]; }
   /// Of a cell in the whole scene.
   int number(int cell) const { return number_[cell]; }
+  /// As the case file addresses it.
+  std::string name(int cell) const { return names_.of(number_[cell]); }
+  void call(const CellNames& names);
   /// Whether anything but its in-plane law answers a change of a cell's area.
   bool holds_area(int cell) const { return holds_area_[cell]; }
   int cells() const { return views_.cells; }
@@ -173,6 +176,7 @@ class Membranes {
   SurfaceSet templates_;                         // one body for each type; only with hold()
   std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
   std::vector<int> number_;                      // [cell] in the whole scene
+  CellNames names_;
   std::vector<bool> holds_area_;                 // [cell]
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
   std::vector<MembraneLaw> law_;                 // [cell]
