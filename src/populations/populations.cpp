@@ -73,7 +73,8 @@ class Packer {
     if (share > most_share) throw InputError(fmt::format("{}: its cells alone would be {:.2f} of the fluid's volume, more than fit in any way: "
                                               "ask for less", amount(scene_.populations[0], 0), share));
     constexpr double loose = 0.15;  // of the volume, of balls around them: chance finds places for these at once
-    scale_ = std::min(1.0, std::cbrt(loose / balls));
+    // Rounded, since the volume's last bits depend on the ranks that sum it up.
+    scale_ = std::min(1.0, 1e-3 * std::floor(1e3 * std::cbrt(loose / balls)));
   }
 
   std::vector<PackedBody> start() const {
