@@ -1,6 +1,7 @@
 // Equal and opposite pushes of contacts, on a vertex and on the corners of its triangle, summed in a fixed order.
 #pragma once
 
+#include "common/counting_sort.hpp"
 #include "contact/contact_law.hpp"
 #include "contact/contact_views.hpp"
 
@@ -10,30 +11,9 @@ namespace corpuscle {
 inline void sort_hits(const SurfaceSet& surface, int groups, const ContactViews& contacts) {
   const SurfaceSet s = surface;
   const ContactViews c = contacts;
-  Kokkos::deep_copy(Exec(), c.hit_start, 0);
-  Kokkos::parallel_for(
-      "corpuscle::contact::count_hits", Policy(0, groups), KOKKOS_LAMBDA(int g) {
-        if (c.push(g) != 0) Kokkos::atomic_fetch_add(&c.hit_start(item_triangle(s, c.item(g))), 1);
-      });
-  Kokkos::parallel_scan(
-      "corpuscle::contact::hit_ends", Policy(0, s.triangles + 1), KOKKOS_LAMBDA(int t, int& sum, bool last) {
-        sum += c.hit_start(t);
-        if (last) c.hit_start(t) = sum;
-      });
-  Kokkos::parallel_for(
-      "corpuscle::contact::place_hits", Policy(0, groups), KOKKOS_LAMBDA(int g) {
-        if (c.push(g) != 0) c.hit(Kokkos::atomic_fetch_add(&c.hit_start(item_triangle(s, c.item(g))), -1) - 1) = g;
-      });
-  Kokkos::parallel_for(
-      "corpuscle::contact::order_hits", Policy(0, s.triangles), KOKKOS_LAMBDA(int t) {
-        const int begin = c.hit_start(t), end = c.hit_start(t + 1);
-        for (int i = begin + 1; i < end; ++i) {
-          const int moved = c.hit(i);
-          int to = i;
-          for (; to > begin && c.hit(to - 1) > moved; --to) c.hit(to) = c.hit(to - 1);
-          c.hit(to) = moved;
-        }
-      });
+  counting_sort(
+      "corpuscle::contact::sort_hits", groups, s.triangles,
+      KOKKOS_LAMBDA(int g) { return c.push(g) != 0 ? item_triangle(s, c.item(g)) : -1; }, c.hit_start, c.hit);
 }
 
 /// Adds the pushes to `sum` [vertex, 3] of the first `vertices`. After sort_hits().

@@ -1,7 +1,7 @@
-// Triangles sorted by the cubic bin that their centre is in: a counting sort whose result does not depend on who counts
-// first.
+// Triangles sorted by the cubic bin that their centre is in.
 #pragma once
 
+#include "common/counting_sort.hpp"
 #include "immersed/views.hpp"
 
 namespace corpuscle {
@@ -73,30 +73,9 @@ inline TriangleBounds bounds_of_triangles(const SurfaceSet& surface) {
 inline void sort_triangles(const SurfaceSet& surface, const TriangleBins& bins) {
   const SurfaceSet s = surface;
   const TriangleBins b = bins;
-  Kokkos::deep_copy(Exec(), b.start, 0);
-  Kokkos::parallel_for(
-      "corpuscle::contact::count_triangles", Policy(0, s.triangles),
-      KOKKOS_LAMBDA(int t) { Kokkos::atomic_fetch_add(&b.start(b.bin_of(centre_of(corners(s, t, {})))), 1); });
-  // To the end of each bin; placing the triangles counts it down to the start.
-  Kokkos::parallel_scan(
-      "corpuscle::contact::bin_ends", Policy(0, b.count() + 1), KOKKOS_LAMBDA(int c, int& sum, bool last) {
-        sum += b.start(c);
-        if (last) b.start(c) = sum;
-      });
-  Kokkos::parallel_for(
-      "corpuscle::contact::place_triangles", Policy(0, s.triangles), KOKKOS_LAMBDA(int t) {
-        b.order(Kokkos::atomic_fetch_add(&b.start(b.bin_of(centre_of(corners(s, t, {})))), -1) - 1) = t;
-      });
-  Kokkos::parallel_for(
-      "corpuscle::contact::order_in_bins", Policy(0, b.count()), KOKKOS_LAMBDA(int c) {
-        const int begin = b.start(c), end = b.start(c + 1);
-        for (int i = begin + 1; i < end; ++i) {
-          const int moved = b.order(i);
-          int to = i;
-          for (; to > begin && b.order(to - 1) > moved; --to) b.order(to) = b.order(to - 1);
-          b.order(to) = moved;
-        }
-      });
+  counting_sort(
+      "corpuscle::contact::sort_triangles", s.triangles, b.count(),
+      KOKKOS_LAMBDA(int t) { return b.bin_of(centre_of(corners(s, t, {}))); }, b.start, b.order);
 }
 
 }  // namespace corpuscle

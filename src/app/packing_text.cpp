@@ -23,7 +23,7 @@ void print_packing(FlowSimulation& simulation) {
     info("populations.{}: {} cell{} \"{}\", hematocrit {:.4f}{}", p, one.cells, one.cells == 1 ? "" : "s", one.type, one.hematocrit,
          one.asked > 0 ? fmt::format(" (asked for {:g})", one.asked) : "");
   }
-  info("packing:  tube hematocrit {:.4f}; smallest gap between cells {}, to the sides of the grid {}", packing->tube_hematocrit,
+  if (packing->smallest_gap_um > 0) info("packing:  tube hematocrit {:.4f}; smallest gap between cells {}, to the sides of the grid {}", packing->tube_hematocrit,
        gap_text(packing->smallest_gap_um), gap_text(packing->smallest_wall_gap_um));
 }
 

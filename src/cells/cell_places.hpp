@@ -18,6 +18,7 @@ struct CellPlaces {
   std::vector<CellReference> types;
   std::vector<CellPlace> cells;  // in the order of CellNames
   CellNames names;
+  double size = 1;  // that packed cells start with, over that of their types: the others have no room
 };
 
 /// Of cells that all have places of their own.

@@ -61,7 +61,11 @@ void SharedCells::start(const CellPlaces& places) {
     total_triangles_ += triangles_of(cell.type);
     if (blocks_.owner(to_vec3(place.center_um)) != comm_.rank()) continue;
     mine.push_back(cell);
-    for (const Triple& x : transform(places.types[cell.type].mesh, place.axis, place.spin_deg, place.center_um).vertices) {
+    TriangleMesh mesh = places.types[cell.type].mesh;
+    if (cell.number >= places.names.listed && places.size != 1)
+      for (Triple& x : mesh.vertices)
+        for (double& component : x) component *= places.size;
+    for (const Triple& x : transform(mesh, place.axis, place.spin_deg, place.center_um).vertices) {
       carried.insert(carried.end(), x.begin(), x.end());
       carried.insert(carried.end(), 3 * (membranes_->carried().size() - 1), 0.0);
     }

@@ -7,7 +7,6 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
-#include "contact/wall_contact.hpp"
 #include "coupling/surface_checks.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "parallel/agree.hpp"
@@ -45,7 +44,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       lengths_us_(schedule.lengths_us()),
       workspace_(std::make_shared<Workspace>()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
-  take_places(scene, packed);
+  take_places(scene, packed, contact_reach(scene));
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
   if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
@@ -54,35 +53,10 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   take_up();
 }
 
-void ForceCoupling::take_places(const Case& scene, const PackedCells* packed) {
-  const Grid& grid = fluid_.grid();
-  const CellPlaces places = find_places(scene, grid, packed);
-  cells_ = std::make_unique<SharedCells>(places, grid, IndexSpace::halo, contact_reach(scene), workspace_);
-  membranes_ = &cells_->membranes();
-  if (scene.populations.empty()) return;
-  packing_ = report_of(scene, places, grid.total_volume());
-  packed_ = share_of(places, grid.comm());
-  packed_gap_ = 1e30;
-  for (const auto& population : scene.populations) packed_gap_ = std::min(packed_gap_, population.gap_um);
-}
-
 /// The vertices are others than before.
 void ForceCoupling::take_up() {
   transfer_->take_up(surfaces());
   Kokkos::deep_copy(membranes_->views().force, 0.0);
-}
-
-/// What fails on one rank fails on all.
-template <class Work>
-void ForceCoupling::together(const Work& work) const {
-  std::string failure;
-  try {
-    work();
-  } catch (const ComputationError& error) {
-    failure = error.what();
-  }
-  failure = agree(fluid_.grid().comm(), failure);
-  if (!failure.empty()) throw ComputationError(failure);
 }
 
 std::string ForceCoupling::vertex_text(int vertex) const {
@@ -125,6 +99,8 @@ void ForceCoupling::watch_outflow() {
 
 void ForceCoupling::check_start() {
   const Comm& comm = fluid_.grid().comm();
+  if (grows_) inflate();
+  if (small_) membranes_->rest_at_size(packed_->size);
   cells_->to_copies(surfaces().x, true);
   update_surface_geometry(surfaces());
   std::vector<int> types;
@@ -155,10 +131,11 @@ void ForceCoupling::check_start() {
         "lengthen the grid",
         nearest_outflow(), outflow_limit_);
   }
-  if (packing_) check_packing();
+  if (packing_ && !small_) check_packing();
   measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
+  if (small_) return membranes_->rest_at_size(1);
   if (!(longest <= stable_us_))
     throw InputError(
         fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "
@@ -166,32 +143,6 @@ void ForceCoupling::check_start() {
                     "would swing and grow. Reduce time.step_us{}",
                     longest, stable_us_, scene_.coupling->slip ? " with the slip correction" : "",
                     scene_.coupling->slip ? ", or set coupling.slip = false" : ""));
-}
-
-/// Packing has seen points and tables: here is what the triangles themselves say.
-/// @throws InputError  for cells that are nearer to each other or to a side than they should be
-void ForceCoupling::check_packing() {
-  constexpr double reach = 0.3;    // um, beyond the gap asked for
-  constexpr double rounded = 0.01; // um, of sides between nodes
-  const Comm& comm = fluid_.grid().comm();
-  ContactSettings settings;
-  settings.range_um = packed_gap_ + reach;
-  const ContactPeers peers{comm, [this] { cells_->to_copies(surfaces().x, true); }};
-  Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
-  contact.take_up(surfaces(), membranes_->templates(), membranes_->views().type);
-  contact.look_at_start(lengths_us_.front());
-  packing_->smallest_gap_um = contact.report().smallest_gap;
-  WallSides sides;
-  for (const auto& boundary : scene_.boundaries) {
-    const int side = static_cast<int>(boundary.side);
-    sides.wall[side / 2][side % 2] = boundary.type != BoundarySettings::Type::periodic;
-  }
-  const double to_side = sides.any() ? least_wall_gap(transfer_->block().lattice, transfer_->views(), sides, settings.range_um) : 1e30;
-  packing_->smallest_wall_gap_um = comm.min(to_side);
-  if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
-  throw InputError(fmt::format("populations: two cells are {:.3g} um from each other, or one {:.3g} um from a side, and gap_um = {:g} is asked "
-                               "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
-                               packing_->smallest_gap_um, packing_->smallest_wall_gap_um, packed_gap_));
 }
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the

@@ -80,6 +80,7 @@ namespace {
 
 const char* const packed_name = "packed_cells";  // [cell, centre, axis, spin]
 const char* const populations_name = "populations";  // [population] cells
+const char* const size_name = "packed_size";
 constexpr hsize_t packed_columns = 7;
 
 /// Where populations were packed, so that a restart need not pack them again.
@@ -95,6 +96,7 @@ void write_packed(CheckpointWriter& file, const PackedShare& share) {
   file.add(packed_name, {static_cast<hsize_t>(share.total), packed_columns}, mine, rows.data());
   const std::vector<std::int64_t> count(share.count.begin(), share.count.end());
   file.add(populations_name, {count.size()}, count.data());
+  file.add(size_name, {1}, &share.size);
 }
 
 }  // namespace
@@ -109,6 +111,7 @@ PackedCells read_packed_cells(const std::string& path, const Comm& comm, const C
   for (const std::int64_t cells : count) packed.count.push_back(static_cast<int>(cells)), total += cells;
   std::vector<double> rows(packed_columns * total);
   file.read(packed_name, {total, packed_columns}, rows.data());
+  file.read(size_name, {1}, &packed.size);
   for (hsize_t c = 0; c < total; ++c) {
     const double* row = rows.data() + packed_columns * c;
     CellPlace cell;

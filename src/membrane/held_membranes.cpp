@@ -76,6 +76,8 @@ void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
   }
 }
 
+void Membranes::rest_at_size(double size) { fill_reference(views_, types_, size); }
+
 void Membranes::make_room(const SurfaceSet& needed) {
   SurfaceSet& set = views_.surface;
   extend(set.x, "x_vertex", needed.vertices);

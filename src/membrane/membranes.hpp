@@ -61,6 +61,8 @@ class Membranes {
   /// Allocates where there is no room, with some to spare. Arrays of what vertices carry keep their content, row by row; what
   /// does not belong there any more is for the caller to replace.
   void hold(const std::vector<HeldCell>& cells, int own);
+  /// Rest states as if all cells were `size` times as large as their types are.
+  void rest_at_size(double size);
   /// What belongs to the own cells' vertices from one step to the next, and travels with them: [vertex, 3] each.
   std::vector<Components<double>> carried() const { return {views_.surface.x, views_.surface.v}; }
   const std::vector<CellReference>& types() const { return types_; }

@@ -45,10 +45,10 @@ class Packer {
   PackedCells pack() {
     count();
     RigidPacking packing(shapes_, start(), space_, scale_);
-    if (!packing.grow()) refuse(packing);
+    if (!packing.grow() && !(may_deform() && packing.shrink(least_size))) refuse(packing);
     PackedCells packed;
+    packed.size = packing.scale();
     packed.count = wanted_;
-    packed.iterations = packing.iterations();
     for (const PackedBody& body : packing.bodies()) {
       if (!body.movable) continue;
       CellPlace place;
@@ -62,6 +62,9 @@ class Packer {
 
  private:
   double cell_volume(std::size_t population) const { return places_.types[types_[population]].law.rest_volume; }
+
+  /// Membranes grow on, and bend, where contact holds them apart; placed cells are not to change.
+  bool may_deform() const { return scene_.contact && scene_.cells.empty(); }
 
   void count() {
     double share = 0, balls = 0;
@@ -169,11 +172,14 @@ class Packer {
     }
     if (text.empty()) text = amount(scene_.populations[0], 0) + ": its cells do not fit";
     if (types_.size() > 1) text += fmt::format("; all together hematocrit {:.3f} of {:.3f}", reached, asked);
-    throw InputError(text + "; they are packed with the shape that they have at rest. Ask for less, for a smaller gap_um, or for a "
-                            "wider grid; another seed may place a few more or less");
+    throw InputError(text + fmt::format("; {}. Ask for less, for a smaller gap_um, or for a "
+                            "wider grid; another seed may place a few more or less",
+                            may_deform() ? "also as membranes they would have to be much smaller"
+                            : scene_.contact ? "beside [[cells]] they keep the shape that they have at rest"
+                                             : "they keep the shape that they have at rest: with [contact] they would bend"));
   }
 
-  static constexpr double most_share = 0.95;
+  static constexpr double most_share = 0.75, least_size = 0.75;
 
   const Case& scene_;
   const CellPlaces& places_;
@@ -206,6 +212,7 @@ PackedCells pack_populations(const Case& scene, const Grid& grid, const CellPlac
 PackedShare share_of(const CellPlaces& places, const Comm& comm) {
   PackedShare share;
   share.count = places.names.count;
+  share.size = places.size;
   share.total = static_cast<std::int64_t>(places.cells.size()) - places.names.listed;
   share.first = share.total * comm.rank() / comm.size();
   const auto begin = places.cells.begin() + places.names.listed;
@@ -242,6 +249,7 @@ CellPlaces find_places(const Case& scene, const Grid& grid, const PackedCells* p
   const PackedCells found = packed ? PackedCells{} : pack_populations(scene, grid, places, types);
   const PackedCells& all = packed ? *packed : found;
   places.names.count = all.count;
+  places.size = all.size;
   places.cells.insert(places.cells.end(), all.cells.begin(), all.cells.end());
   std::size_t cell = scene.cells.size();
   for (std::size_t p = 0; p < types.size(); ++p)

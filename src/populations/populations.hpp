@@ -16,7 +16,7 @@ int population_count(const PopulationSettings& population, int number, double fl
 struct PackedCells {
   std::vector<CellPlace> cells;
   std::vector<int> count;  // [population]
-  long iterations = 0;
+  double size = 1;         // of the largest shapes that fit, over their own: membranes grow from there
 };
 
 /// What a rank keeps of it.
@@ -24,6 +24,7 @@ struct PackedShare {
   std::vector<CellPlace> cells;  // of all, those from `first` on
   std::int64_t first = 0, total = 0;
   std::vector<int> count;        // [population]
+  double size = 1;               // as PackedCells
 };
 PackedShare share_of(const CellPlaces& places, const Comm& comm);
 /// Without gaps.

@@ -317,6 +317,16 @@ bool RigidPacking::grow() {
   return settle(most_steps, false);
 }
 
+bool RigidPacking::shrink(double least) {
+  constexpr double step = 0.985;
+  fine_ = true;
+  for (scale_ *= step; scale_ >= least; scale_ *= step) {
+    rest();
+    if (settle(steps_between_removals, false)) return true;
+  }
+  return false;
+}
+
 void RigidPacking::thin_out() {
   scale_ = 1;
   for (;;) {

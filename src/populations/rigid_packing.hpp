@@ -54,6 +54,8 @@ class RigidPacking {
   /// Until all have their size and gap, or no more comes of it.
   /// @returns whether they have
   bool grow();
+  /// A little smaller, until there is room. @returns whether there is before they are `least`
+  bool shrink(double least);
   /// All of full size; those that are most in each other's way are taken out until the rest fits.
   void thin_out();
 
