@@ -1,6 +1,7 @@
 // Repulsion of membranes by the grid's walls, where markers tell how near they are.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "contact/contact_law.hpp"
 #include "transfer/marker_views.hpp"
 
@@ -60,6 +61,23 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
       if (wall.gap < reach && wall.gap < nearest.gap) nearest = wall;
     }
   return nearest;
+}
+
+/// um from any of the sides, within `reach`, of the markers at home; 1e30 where none is so near.
+inline double least_wall_gap(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides, double reach) {
+  const Lattice lattice = grid_lattice;
+  const MarkerViews m = markers;
+  const WallSides walls = wall_sides;
+  double least = 1e30;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::least_wall_gap", Policy(0, m.count),
+      KOKKOS_LAMBDA(int marker, double& sum) {
+        if (!m.home(marker)) return;
+        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        sum = smaller(sum, nearest_wall(lattice, walls, eta, reach).gap);
+      },
+      Smallest(least));
+  return least;
 }
 
 /// load [vertex, 4] = the force of the walls on the vertices at home, nN, and their energy, fJ; zero elsewhere. Areas

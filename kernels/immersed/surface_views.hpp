@@ -8,6 +8,8 @@ namespace corpuscle {
 
 constexpr int no_vertex = 1 << 30;
 
+struct CellNames;  // of the host alone
+
 /// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank holds all
 /// surfaces, or those that reach into its block (SharedCells): then copies of other ranks' cells, and of its own where a
 /// periodic side brings them back, follow its own cells, shifted to where this block sees them. Arrays may have room for more
@@ -31,6 +33,7 @@ struct SurfaceSet {
   Array<int> ring_start;      // [vertices + 1] into ring_triangle
   Array<int> ring_triangle;   // triangles around each vertex, in order
   Array<std::int8_t> ring_corner;  // [as ring_triangle] which corner of that triangle the vertex is: 0, 1, 2
+  const CellNames* names = nullptr;  // for messages; null: all cells are those that a case lists
 };
 
 }  // namespace corpuscle

@@ -58,4 +58,12 @@ inline double power_of(int count, const Components<double>& force, const Compone
   return power;
 }
 
+/// v = mobility x force of the first `vertices`.
+inline void scale_forces(int vertices, double mobility, const Components<double>& force, const Components<double>& velocity) {
+  const Components<double> f = force, v = velocity;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::scale_forces", Policy(0, vertices),
+      KOKKOS_LAMBDA(int i) { store(v, i, mobility * load(f, i)); });
+}
+
 }  // namespace corpuscle

@@ -72,6 +72,12 @@ CoarserRun fewer_vertices(const Case& scene) {
 
 std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds) {
   std::vector<CoarserRun> runs;
+  if (!scene.populations.empty()) {  // packed on another grid or with other meshes, cells start elsewhere
+    if (kinds == "all") return {longer_step(scene)};
+    for (const char* kind : {"spacing", "vertices"})
+      if (kinds.find(kind) != std::string::npos)
+        refuse(kind, "populations would be packed anew, and the runs differ from their start; use --estimate-error=step");
+  }
   if (kinds == "all") {
     if (scene.grid && scene.grid->generator != GridSettings::Generator::file) runs.push_back(doubled_spacing(scene));
     if (scene.fluid) runs.push_back(longer_step(scene));

@@ -52,7 +52,9 @@ void sample_grid(const GridSettings& settings, SceneSize& size) {
 #else
     const Comm alone;
 #endif
-    size.skewed = !Grid(alone, source, size.periodic).orthogonal();
+    const Grid coarse(alone, source, size.periodic);
+    size.skewed = !coarse.orthogonal();
+    size.volume = coarse.total_volume();
   } catch (const InputError&) {
     // Folded, perhaps since it is coarse; if not, the grid itself says so when it is built.
   }
@@ -99,6 +101,15 @@ double vertices_of(const BodySettings& body, const SceneSize& size) {
   return std::clamp(4 * std::acos(-1.0) * largest * largest / (0.87 * h2), 162.0, 100000.0);
 }
 
+/// About, um3.
+double volume_of(const CellSettings& cell) {
+  const double ball = 4.0 / 3 * std::acos(-1.0);
+  if (cell.mesh.empty() && cell.shape == CellSettings::Shape::sphere) return ball * std::pow(cell.radius_um, 3);
+  if (cell.mesh.empty() && cell.shape == CellSettings::Shape::ellipsoid)
+    return ball * cell.semi_axes_um[0] * cell.semi_axes_um[1] * cell.semi_axes_um[2];
+  return 94 * std::pow(cell.diameter_um / 7.82, 3);
+}
+
 /// From a cell's middle to its end, um; zero for one from a file.
 double reach_of(const CellSettings& cell) {
   if (!cell.mesh.empty()) return 0;
@@ -111,16 +122,29 @@ double reach_of(const CellSettings& cell) {
 
 double vertices_of(const CellSettings& cell) { return cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh); }
 
+double cells_of(const PopulationSettings& population, const Case& scene, const SceneSize& size) {
+  const CellSettings& cell = scene.cell_types[population.type].cell;
+  return population.count > 0 ? population.count : population.hematocrit * size.volume / volume_of(cell);
+}
+
 /// A rank's share of cells that are spread evenly, whole ones; and the copies of those that reach into its block and what it
 /// must know of around it, where others lie or the domain goes on.
 void share_cells(const Case& scene, int ranks, SceneSize& size) {
-  if (scene.cells.empty()) return;
-  const auto count = static_cast<double>(scene.cells.size());
+  if (!scene.has_cells()) return;
+  auto count = static_cast<double>(scene.cells.size());
   double all = 0, reach = 0;
   for (const auto& cell : scene.cells) {
     all += vertices_of(cell);
     reach = std::max(reach, reach_of(cell));
   }
+  for (const auto& population : scene.populations) {
+    const CellSettings& cell = scene.cell_types[population.type].cell;
+    const double cells = cells_of(population, scene, size);
+    count += cells;
+    all += cells * vertices_of(cell);
+    reach = std::max(reach, reach_of(cell));
+  }
+  if (!(count > 0)) return;
   const double share = std::ceil(count / ranks);
   double around = 1;  // the volume in which cells are copied or own over the block's
   for (int d = 0; d < 3; ++d)
@@ -179,6 +203,8 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   SceneSize size;
   if (scene.grid) measure_grid(scene, ranks, size);
   for (const auto& cell : scene.cells) size.vertices += vertices_of(cell);
+  for (const auto& population : scene.populations)
+    size.vertices += cells_of(population, scene, size) * vertices_of(scene.cell_types[population.type].cell);
   for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
   size.cells_listed = static_cast<double>(scene.cells.size());
   size.shared = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
@@ -188,7 +214,7 @@ SceneSize measure_scene(const Case& scene, int ranks) {
 }
 
 MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ranks) {
-  const bool surfaces = !scene.cells.empty() || !scene.bodies.empty();
+  const bool surfaces = scene.has_cells() || !scene.bodies.empty();
   const bool convective = scene.fluid && scene.fluid->convection != FluidSettings::Convection::none;
   const double nodes = size.padded(), owned = size.owned();
   // Bytes of each array of a node, of the classes named; doubles are 8, vectors of the cycles 12.

@@ -14,6 +14,7 @@ struct SceneSize {
   std::array<bool, 3> periodic{}, cut{};
   bool skewed = false;               // the pressure equation needs a matrix
   bool sampled = true;               // skewness and spacing are the grid's; false: of a file that was not read
+  double volume = 0;                 // um3, about; 0 where the grid was not sampled
   double vertices = 0;               // of all surfaces
   double images = 1;                 // under which each surface is seen: 3 for every periodic direction
   double cells_listed = 0;           // cells of the whole scene

@@ -182,14 +182,14 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
     totals_.area_drift = larger(totals_.area_drift, drift);
     if (!(drift <= senseless_area))
       throw ComputationError(fmt::format(
-          "membrane: the area of cells.{} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
+          "membrane: the area of {} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
           "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
           "tell (grid.nodes); reduce the flow "
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
           "{}",
-          number, 100 * drift, 100 * lysis_area,
-          few_cells_ && scene_.cells[number].type >= 0 ? constant_key(scene_.cells[number], "area_modulus_uN_per_m")
-          : few_cells_                                 ? fmt::format("cells.{}.area_modulus_uN_per_m", number)
+          membranes.name(cell), 100 * drift, 100 * lysis_area,
+          few_cells_ && number < static_cast<int>(scene_.cells.size()) && scene_.cells[number].type >= 0 ? constant_key(scene_.cells[number], "area_modulus_uN_per_m")
+          : few_cells_ && number < static_cast<int>(scene_.cells.size()) ? fmt::format("cells.{}.area_modulus_uN_per_m", number)
                                                        : "its area_modulus_uN_per_m"));
   }
 }
@@ -210,6 +210,11 @@ void FlowOutput::watch_shared_cells(const std::vector<CellDiagnostics>& cells) {
   if (!failure.empty()) throw ComputationError(failure);
 }
 
+/// z for those that were packed.
+Triple FlowOutput::axis_at_start(int number) const {
+  return number < static_cast<int>(scene_.cells.size()) ? scene_.cells[number].axis : Triple{0, 0, 1};
+}
+
 /// @param travelled  by how much the cell has been moved back through periodic sides, um
 /// @param turned     what CellShapes has found
 HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled,
@@ -227,7 +232,7 @@ HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const 
   const auto& v = d.velocity_um_per_us;
   const bool moving = std::hypot(v[0], v[1], v[2]) > 1e-9;
   const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
-                                        moving ? v : scene_.cells[sample.cell].axis);
+                                        moving ? v : axis_at_start(sample.cell));
   sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};
   sample.more.insert(sample.more.end(), turned.begin(), turned.end());
   return sample;

@@ -62,6 +62,7 @@ class FlowOutput {
   const std::vector<std::string>& find_columns();
   const std::vector<std::vector<double>>& measure_shapes();
   std::vector<double> wall_stress_Pa();
+  Triple axis_at_start(int number) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
   void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
   void gather_samples();

@@ -3,10 +3,12 @@
 #include "app/scene_runs.hpp"
 #include "app/stop_signal.hpp"
 #include "app/waiting.hpp"
+#include "app/packing_text.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/restart.hpp"
 #include "output/on_root.hpp"
+#include "populations/populations.hpp"
 #include "parallel/agree.hpp"
 
 #include <fmt/ranges.h>
@@ -64,6 +66,17 @@ void print_coupling(FlowSimulation& simulation) {
   if (substeps > 1)
     info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
          simulation.membranes()->stable_step_us());
+}
+
+/// Cells of populations that a checkpoint has; null where they are to be packed.
+std::unique_ptr<PackedCells> packed_before(const Comm& comm, const Case& scene, const std::string& checkpoint, const Place& place) {
+#ifdef CORPUSCLE_HDF5
+  if (!checkpoint.empty() && !scene.populations.empty())
+    return std::make_unique<PackedCells>(read_packed_cells(checkpoint, comm, scene, place.files));
+#else
+  (void)comm, (void)scene, (void)checkpoint, (void)place;
+#endif
+  return nullptr;
 }
 
 /// @return what the report has counted until the checkpoint; none without a restart
@@ -156,7 +169,10 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   const auto start = Clock::now();
   Timers timers;
   StopSignal signal(comm);
-  FlowSimulation simulation(comm, scene, timers);
+  auto packed = packed_before(comm, scene, options.restart, place);
+  FlowSimulation simulation(comm, scene, timers, packed.get());
+  packed.reset();
+  print_packing(simulation);
   print_schedule(simulation.schedule());
   print_coupling(simulation);
   const auto totals = restart(scene, options.restart, place, simulation);
@@ -195,6 +211,7 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
     ending.code = exit_at_outflow;
     report.stopped = simulation.outflow_message();
   }
+  fill_packing(report, simulation);
   output->fill(report);
   write_report(place.folder, comm, report);
   return ending;

@@ -26,7 +26,7 @@ std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) 
   const auto nodes = padded_nodes(scene);
   if (module == "convection" && nodes) return ModuleCost{5, *nodes * 6 * 8 * 1e-6};
   if (module == "immersed search" && nodes) return ModuleCost{38, *nodes * 51 * 1e-6};
-  if (module == "membrane viscosity" && !scene.cells.empty()) {
+  if (module == "membrane viscosity" && !scene.cells.empty() && scene.populations.empty()) {
     double vertices = 0;
     for (const auto& cell : scene.cells) {
       if (!cell.mesh.empty()) return std::nullopt;
@@ -42,7 +42,7 @@ std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) 
 ModuleList list_modules(const Case& scene, int ranks) {
   ModuleList list;
   const auto add = [&](const std::string& name, bool active) { (active ? list.active : list.left_out).push_back(name); };
-  const bool fluid = scene.fluid.has_value(), cells = !scene.cells.empty(), bodies = !scene.bodies.empty();
+  const bool fluid = scene.fluid.has_value(), cells = scene.has_cells(), bodies = !scene.bodies.empty();
   const bool viscous = std::any_of(scene.cells.begin(), scene.cells.end(),
                                    [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; });
   const bool files = outputs_left_out(scene.output).empty();
@@ -53,6 +53,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   add("transfer of forces", force);
   add("contact", force && scene.contact);
   add("rigid bodies", bodies);
+  add("packing", !scene.populations.empty());
   add("membrane", cells);
   add("membrane viscosity", viscous);
   add("coupling", fluid && cells);

@@ -4,6 +4,7 @@
 #include "app/estimate.hpp"
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
+#include "app/packing_text.hpp"
 #include "app/scene_files.hpp"
 #include "app/scene_runs.hpp"
 #include "app/surfaces.hpp"
@@ -210,6 +211,7 @@ void check_case(const Comm& comm, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   FlowSimulation simulation(comm, scene, timers);
   const double set_up_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  print_packing(simulation);
   const auto& index = simulation.grid().index();
   const double nodes = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,

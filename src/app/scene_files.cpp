@@ -49,6 +49,8 @@ std::string fingerprint_files(const Comm& comm, const Case& scene) {
       list(key, path, surfaces[path]);
     };
     for (std::size_t c = 0; c < scene.cells.size(); ++c) surface(fmt::format("cells.{}.mesh", c), scene.cells[c].mesh);
+    for (std::size_t p = 0; p < scene.populations.size(); ++p)
+      surface(fmt::format("populations.{}.mesh", p), scene.cell_types[scene.populations[p].type].cell.mesh);
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) surface(fmt::format("bodies.{}.file", b), scene.bodies[b].file);
     if (scene.grid && !scene.grid->file.empty()) list("grid.file", scene.grid->file, grid_content(scene.grid->file));
   });

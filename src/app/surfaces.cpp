@@ -54,10 +54,16 @@ void print_cell_types(const Case& scene) {
   const auto count = [&](int type) {
     return std::count_if(scene.cells.begin(), scene.cells.end(), [&](const CellSettings& c) { return c.type == type; });
   };
+  const auto packed = [&](int type) {
+    return std::any_of(scene.populations.begin(), scene.populations.end(), [&](const auto& p) { return p.type == type; });
+  };
   for (std::size_t k = 0; k < scene.cell_types.size(); ++k) {
     const auto& [name, cell] = scene.cell_types[k];
     info("cell type \"{}\": {}; {}, shear modulus {:g} uN/m; {}", name, shape_text(cell), law_text(cell),
-         cell.shear_modulus_uN_per_m, cells_text(count(int(k))));
+         cell.shear_modulus_uN_per_m,
+         !packed(int(k))       ? cells_text(count(int(k)))
+         : count(int(k)) == 0 ? std::string("cells of populations")
+                              : cells_text(count(int(k))) + " beside those of its populations");
   }
   if (!scene.cell_types.empty() && count(-1) > 0) info("cells with keys of their own: {}", count(-1));
 }
@@ -69,6 +75,11 @@ void print_surfaces(const Case& scene) {
     if (!cell.mesh.empty() && cells.emplace(cell.mesh, cell.scale, cell.recenter, cell.align).second)
       print_surface(cell.type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", cell.type), cell.mesh,
                     read_cell_surface(cell), true);
+  }
+  for (const auto& population : scene.populations) {
+    const auto& cell = scene.cell_types[population.type].cell;
+    if (!cell.mesh.empty() && cells.emplace(cell.mesh, cell.scale, cell.recenter, cell.align).second)
+      print_surface(fmt::format("cell_types.{}", cell.type), cell.mesh, read_cell_surface(cell), true);
   }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const auto& body = scene.bodies[b];

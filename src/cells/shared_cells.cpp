@@ -33,7 +33,7 @@ SpaceBox box_of(const HostMirror<Table<double>>& boxes, int cell, double margin)
 
 }  // namespace
 
-SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
+SharedCells::SharedCells(const CellPlaces& places, const Grid& grid, int layers, double contact_um,
                          std::shared_ptr<Workspace> workspace)
     : comm_(grid.comm()),
       blocks_(grid, layers),
@@ -41,31 +41,36 @@ SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& gri
       frame_(periodic_frame(grid)),
       skin_(grid.mean_spacing()),
       contact_(contact_um) {
-  const CellTypes types = find_cell_types(cells);
-  membranes_ = std::make_unique<Membranes>(types.references, std::move(workspace));
-  start(cells, types);
+  membranes_ = std::make_unique<Membranes>(places.types, std::move(workspace));
+  membranes_->call(places.names);
+  start(places);
 }
 
 /// Each rank takes those in its block and makes their meshes.
-void SharedCells::start(const std::vector<CellSettings>& cells, const CellTypes& types) {
+void SharedCells::start(const CellPlaces& places) {
   std::vector<CellRecord> mine;
   std::vector<double> carried;
-  for (std::size_t c = 0; c < cells.size(); ++c) {
+  for (std::size_t c = 0; c < places.cells.size(); ++c) {
+    const CellPlace& place = places.cells[c];
     CellRecord cell;
-    cell.type = types.of_cell[c];
+    cell.type = place.type;
     cell.number = static_cast<int>(c);
     cell.first_vertex = total_vertices_;
     cell.first_triangle = total_triangles_;
     total_vertices_ += vertices_of(cell.type);
     total_triangles_ += triangles_of(cell.type);
-    if (blocks_.owner(to_vec3(cells[c].center_um)) != comm_.rank()) continue;
+    if (blocks_.owner(to_vec3(place.center_um)) != comm_.rank()) continue;
     mine.push_back(cell);
-    for (const Triple& x : placed_mesh(types.references[cell.type], cells[c]).vertices) {
+    TriangleMesh mesh = places.types[cell.type].mesh;
+    if (cell.number >= places.names.listed && places.size != 1)
+      for (Triple& x : mesh.vertices)
+        for (double& component : x) component *= places.size;
+    for (const Triple& x : transform(mesh, place.axis, place.spin_deg, place.center_um).vertices) {
       carried.insert(carried.end(), x.begin(), x.end());
       carried.insert(carried.end(), 3 * (membranes_->carried().size() - 1), 0.0);
     }
   }
-  total_ = static_cast<int>(cells.size());
+  total_ = static_cast<int>(places.cells.size());
   restore(mine, carried, {}, 0);
 }
 

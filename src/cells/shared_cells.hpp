@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "cells/cell_places.hpp"
 #include "cells/copy_messages.hpp"
 #include "cells/rank_blocks.hpp"
 #include "membrane/membranes.hpp"
@@ -27,7 +28,7 @@ class SharedCells {
   /// @param layers      cells around a rank's own in which it must know of surfaces
   /// @param contact_um  a rank has copies of cells that are so near to its own; 0: only those that reach into its block
   /// @throws InputError  as Membranes
-  SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
+  SharedCells(const CellPlaces& places, const Grid& grid, int layers, double contact_um,
               std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
   const Comm& comm() const { return comm_; }
@@ -68,7 +69,7 @@ class SharedCells {
   int copies() const { return surfaces().cells - surfaces().own_cells; }
 
  private:
-  void start(const std::vector<CellSettings>& cells, const CellTypes& types);
+  void start(const CellPlaces& places);
   int vertices_of(int type) const { return static_cast<int>(membranes_->types()[type].mesh.vertices.size()); }
   int triangles_of(int type) const { return static_cast<int>(membranes_->types()[type].mesh.triangles.size()); }
   void measure(double ahead_us);

@@ -29,6 +29,9 @@ struct StepStatistics {
 };
 
 class SharedCells;
+struct PackedCells;
+struct PackingReport;
+struct PackedShare;
 
 class Coupling {
  public:
@@ -85,6 +88,9 @@ class Coupling {
   virtual Membranes* membranes() { return nullptr; }
   /// Where every rank has its own; null where all ranks have all cells.
   virtual SharedCells* shared_cells() { return nullptr; }
+  /// Of the case's populations; null without any. And this rank's share of where they were packed, for checkpoints.
+  virtual const PackingReport* packing() const { return nullptr; }
+  virtual const PackedShare* packed() const { return nullptr; }
   /// A checkpoint's cells are in shared_cells().
   virtual void cells_restored() {}
   /// Of the whole scene.
@@ -100,7 +106,9 @@ class Coupling {
 double negligible_speed(const Case& scene, double viscosity);
 
 /// The coupling that a case with cells or bodies asks for.
+/// @param packed  cells of populations where an earlier run had packed them; null: they are packed now
 /// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them
-std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers);
+std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers,
+                                        const PackedCells* packed = nullptr);
 
 }  // namespace corpuscle

@@ -23,17 +23,17 @@ std::array<bool, 3> periodic_directions(const std::vector<BoundarySettings>& bou
 /// residual over the operator's lowest eigenvalue (0.03 there).
 FluidSettings fluid_settings(const Case& scene) {
   FluidSettings settings = *scene.fluid;
-  if (scene.coupling && !scene.cells.empty() && scene.coupling->scheme == CouplingSettings::Scheme::iterated)
+  if (scene.coupling && scene.has_cells() && scene.coupling->scheme == CouplingSettings::Scheme::iterated)
     settings.momentum_tolerance = std::min(settings.momentum_tolerance, 1e-6 * scene.coupling->tolerance);
   // A pressure that follows within the step pushes a light membrane back harder than a staggered coupling anticipates: with
   // repeated projections cells of 1 to 100 pg in the tube swung and broke within 25 steps, at any step from 0.05 to 50 us.
-  if (!scene.cells.empty()) settings.repeat_projection = false;
+  if (scene.has_cells()) settings.repeat_projection = false;
   return settings;
 }
 
 }  // namespace
 
-FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers)
+FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers, const PackedCells* packed)
     : timers_(timers), schedule_(scene.time, sudden_changes(scene.boundaries, scene.time.step_us)) {
   const auto scope = timers_.scope("set-up");
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
@@ -41,7 +41,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   check_courses(scene.boundaries, schedule_);
   check_pressure_gradient(*grid_, scene.fluid->pressure_gradient_Pa_per_um);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
-  if (!scene.cells.empty() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_);
+  if (scene.has_cells() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_, packed);
 }
 
 void FlowSimulation::step() {

@@ -11,7 +11,8 @@ namespace corpuscle {
 class FlowSimulation {
  public:
   /// @throws InputError  for settings that cannot work, a coupling that cannot be stable among them
-  FlowSimulation(const Comm& comm, const Case& scene, Timers& timers);
+  /// @param packed  cells of populations where an earlier run had packed them; null: they are packed now
+  FlowSimulation(const Comm& comm, const Case& scene, Timers& timers, const PackedCells* packed = nullptr);
 
   /// One step of the schedule.
   /// @throws ComputationError  when anything breaks down; the message says what, where and why

@@ -36,15 +36,15 @@ double contact_reach(const Case& scene) {
 
 }  // namespace
 
-ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers)
+ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers,
+                             const PackedCells* packed)
     : scene_(without_cells(scene)),
       fluid_(fluid),
       timers_(timers),
       lengths_us_(schedule.lengths_us()),
       workspace_(std::make_shared<Workspace>()),
-      cells_(std::make_unique<SharedCells>(scene.cells, fluid.grid(), IndexSpace::halo, contact_reach(scene), workspace_)),
-      membranes_(&cells_->membranes()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
+  take_places(scene, packed, contact_reach(scene));
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
   if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
@@ -57,19 +57,6 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
 void ForceCoupling::take_up() {
   transfer_->take_up(surfaces());
   Kokkos::deep_copy(membranes_->views().force, 0.0);
-}
-
-/// What fails on one rank fails on all.
-template <class Work>
-void ForceCoupling::together(const Work& work) const {
-  std::string failure;
-  try {
-    work();
-  } catch (const ComputationError& error) {
-    failure = error.what();
-  }
-  failure = agree(fluid_.grid().comm(), failure);
-  if (!failure.empty()) throw ComputationError(failure);
 }
 
 std::string ForceCoupling::vertex_text(int vertex) const {
@@ -112,6 +99,8 @@ void ForceCoupling::watch_outflow() {
 
 void ForceCoupling::check_start() {
   const Comm& comm = fluid_.grid().comm();
+  if (grows_) inflate();
+  if (small_) membranes_->rest_at_size(packed_->size);
   cells_->to_copies(surfaces().x, true);
   update_surface_geometry(surfaces());
   std::vector<int> types;
@@ -142,9 +131,11 @@ void ForceCoupling::check_start() {
         "lengthen the grid",
         nearest_outflow(), outflow_limit_);
   }
+  if (packing_ && !small_) check_packing();
   measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
+  if (small_) return membranes_->rest_at_size(1);
   if (!(longest <= stable_us_))
     throw InputError(
         fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "

@@ -3,7 +3,10 @@
 
 #include "cells/shared_cells.hpp"
 #include "coupling/cell_loads.hpp"
+#include "core/error.hpp"
 #include "coupling/coupling.hpp"
+#include "parallel/agree.hpp"
+#include "populations/populations.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -11,7 +14,7 @@ namespace corpuscle {
 
 class ForceCoupling : public Coupling {
  public:
-  ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers);
+  ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers, const PackedCells* packed);
 
   void check_start() override;
   /// Forces at the present shape, one fluid solve with them, and a step with the velocity that the fluid has then.
@@ -33,6 +36,9 @@ class ForceCoupling : public Coupling {
     if (loads_) loads_->resume(report);
   }
 
+  /// The largest stable step, where it is not that of cells at rest.
+  std::vector<double> state() const override;
+  void set_state(const std::vector<double>& state) override { stable_us_ = state.at(0); }
   void cells_restored() override;
   void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
@@ -41,13 +47,29 @@ class ForceCoupling : public Coupling {
   SharedCells* shared_cells() override { return cells_.get(); }
   int cells() override { return cells_->total(); }
   long vertices() override { return cells_->total_vertices(); }
+  const PackingReport* packing() const override { return packing_ ? &*packing_ : nullptr; }
+  const PackedShare* packed() const override { return packed_ ? &*packed_ : nullptr; }
 
  private:
+  void take_places(const Case& scene, const PackedCells* packed, double contact_um);
+  void check_packing();
+  void inflate();
+  void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);
   void take_up();
   void watch_outflow();
+  /// What fails on one rank fails on all.
   template <class Work>
-  void together(const Work& work) const;
+  void together(const Work& work) const {
+    std::string failure;
+    try {
+      work();
+    } catch (const ComputationError& error) {
+      failure = error.what();
+    }
+    failure = agree(fluid_.grid().comm(), failure);
+    if (!failure.empty()) throw ComputationError(failure);
+  }
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
   /// The sum of all forces at the last gathering of loads.
@@ -65,6 +87,11 @@ class ForceCoupling : public Coupling {
   std::vector<double> lengths_us_;  // of all steps there will be
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
+  std::optional<PackingReport> packing_;  // only with populations
+  std::optional<PackedShare> packed_;
+  double packed_gap_ = 0;                 // um, the least of the populations'
+  bool grows_ = false;                    // packed cells are still smaller than they are to be, and must grow
+  bool small_ = false;                    // or are about to be replaced by those of a checkpoint
   Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace

@@ -30,6 +30,8 @@ bool uses_robin(const CouplingSettings& coupling) {
 double negligible_speed(const Case& scene, double viscosity) {
   constexpr double share = 1e-4;
   double modulus = 0;
+  for (const auto& population : scene.populations)
+    modulus = std::max(modulus, scene.cell_types[population.type].cell.shear_modulus_uN_per_m * units::uN_per_m);
   for (const auto& cell : scene.cells) modulus = std::max(modulus, cell.shear_modulus_uN_per_m * units::uN_per_m);
   return share * modulus / viscosity;
 }
@@ -279,12 +281,12 @@ StepStatistics IteratedCoupling::advance(double time, double dt) {
 }
 
 std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid,
-                                        Timers& timers) {
+                                        Timers& timers, const PackedCells* packed) {
   std::unique_ptr<Coupling> coupling;
-  if (scene.cells.empty())
+  if (!scene.has_cells())
     coupling = std::make_unique<SharpCoupling>(scene, fluid, timers, nullptr);
   else if (scene.coupling->scheme == CouplingSettings::Scheme::force)
-    coupling = std::make_unique<ForceCoupling>(scene, schedule, fluid, timers);
+    coupling = std::make_unique<ForceCoupling>(scene, schedule, fluid, timers, packed);
   else if (scene.coupling->scheme == CouplingSettings::Scheme::iterated)
     coupling = std::make_unique<IteratedCoupling>(scene, fluid, timers);
   else

@@ -6,6 +6,7 @@
 #include "core/error.hpp"
 #include "output/checkpoint.hpp"
 #include "output/owned_values.hpp"
+#include "populations/populations.hpp"
 
 #include <fmt/format.h>
 
@@ -75,6 +76,52 @@ const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i
 
 }  // namespace
 
+namespace {
+
+const char* const packed_name = "packed_cells";  // [cell, centre, axis, spin]
+const char* const populations_name = "populations";  // [population] cells
+const char* const size_name = "packed_size";
+constexpr hsize_t packed_columns = 7;
+
+/// Where populations were packed, so that a restart need not pack them again.
+void write_packed(CheckpointWriter& file, const PackedShare& share) {
+  std::vector<double> rows;
+  for (const CellPlace& cell : share.cells) {
+    rows.insert(rows.end(), cell.center_um.begin(), cell.center_um.end());
+    rows.insert(rows.end(), cell.axis.begin(), cell.axis.end());
+    rows.push_back(cell.spin_deg);
+  }
+  Rows mine;
+  mine.add(share.first, share.cells.size());
+  file.add(packed_name, {static_cast<hsize_t>(share.total), packed_columns}, mine, rows.data());
+  const std::vector<std::int64_t> count(share.count.begin(), share.count.end());
+  file.add(populations_name, {count.size()}, count.data());
+  file.add(size_name, {1}, &share.size);
+}
+
+}  // namespace
+
+PackedCells read_packed_cells(const std::string& path, const Comm& comm, const Case& scene, const std::string& files) {
+  const CheckpointReader file(path, comm);
+  allowed_changes(path, file.header(), scene.resolved, files);
+  PackedCells packed;
+  std::vector<std::int64_t> count(scene.populations.size());
+  file.read(populations_name, {count.size()}, count.data());
+  hsize_t total = 0;
+  for (const std::int64_t cells : count) packed.count.push_back(static_cast<int>(cells)), total += cells;
+  std::vector<double> rows(packed_columns * total);
+  file.read(packed_name, {total, packed_columns}, rows.data());
+  file.read(size_name, {1}, &packed.size);
+  for (hsize_t c = 0; c < total; ++c) {
+    const double* row = rows.data() + packed_columns * c;
+    CellPlace cell;
+    for (int d = 0; d < 3; ++d) cell.center_um[d] = row[d], cell.axis[d] = row[3 + d];
+    cell.spin_deg = row[6];
+    packed.cells.push_back(cell);
+  }
+  return packed;
+}
+
 void write_checkpoint(const std::string& path, FlowSimulation& simulation, const CheckpointTexts& texts) {
   const IndexSpace& index = simulation.grid().index();
   const auto progress = simulation.progress();
@@ -109,6 +156,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const auto coupling = simulation.coupling()->state();
     if (!coupling.empty()) file.add("coupling", {coupling.size()}, coupling.data());
   }
+  if (simulation.coupling() && simulation.coupling()->packed()) write_packed(file, *simulation.coupling()->packed());
   if (simulation.shared_cells()) {
     write_cells(file, simulation.grid().comm(), *simulation.shared_cells());
   } else if (simulation.membranes()) {

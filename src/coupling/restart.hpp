@@ -23,6 +23,10 @@ struct CheckpointTexts {
 /// @throws ComputationError  when the disk is full
 void write_checkpoint(const std::string& path, FlowSimulation& simulation, const CheckpointTexts& texts);
 
+/// Where the cells of populations were packed by the run that wrote the checkpoint.
+/// @throws InputError  for a checkpoint of another scene, or as CheckpointReader
+PackedCells read_packed_cells(const std::string& path, const Comm& comm, const Case& scene, const std::string& files);
+
 struct Restored {
   std::string totals;
   std::vector<CaseChange> changes;  // of keys that a restart may change

@@ -124,8 +124,18 @@ SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies, int cells) 
   return set;
 }
 
+std::string CellNames::of(int number) const {
+  int within = number - listed;
+  for (std::size_t p = 0; p < count.size() && within >= 0; ++p) {
+    if (within < count[p]) return fmt::format("populations.{} cell {}", p, within);
+    within -= count[p];
+  }
+  return fmt::format("cells.{}", number);
+}
+
 std::string body_name(const SurfaceSet& surfaces, int body) {
   const auto number = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.number);
+  if (body < surfaces.cells && surfaces.names) return surfaces.names->of(number(body));
   return (body < surfaces.cells ? "cells." : "bodies.") + std::to_string(number(body));
 }
 

@@ -14,7 +14,16 @@ namespace corpuscle {
 /// @throws InputError  if a mesh is not a closed surface
 SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies, int cells = 0);
 
-/// As the case file addresses it: "cells.0", "bodies.2".
+/// How the cells of a scene are called: first those of [[cells]], then those of each of the [[populations]].
+struct CellNames {
+  int listed = 0;
+  std::vector<int> count;  // [population]
+
+  /// "cells.3", "populations.0 cell 17"
+  std::string of(int number) const;
+};
+
+/// As the case file addresses it: "cells.0", "populations.0 cell 17", "bodies.2".
 std::string body_name(const SurfaceSet& surfaces, int body);
 
 /// Positions of one body's vertices and its triangles, copied back to the host.

@@ -130,6 +130,22 @@ inline std::string constant_key(const CellSettings& cell, const std::string& key
   return (cell.type < 0 ? "cells." : "cell_types." + std::to_string(cell.type) + ".") + key;
 }
 
+/// [[populations]]: cells of one type that the program places
+struct PopulationSettings {
+  enum class Orientation { random, aligned };
+
+  int type = 0;                         // of Case::cell_types
+  double hematocrit = 0;                // share of the fluid's volume; 0: count says how many
+  int count = 0;                        // 0: as many as the hematocrit asks for
+  int seed = 1;
+  double gap_um = 0.1;                  // least, of its cells to any other surface at the start
+  Orientation orientation = Orientation::random;
+  Triple axis{0, 0, 1};                 // aligned: direction of the cells' symmetry axes
+  std::optional<Triple> lower_um, upper_um;  // box within which its cells start
+
+  bool operator==(const PopulationSettings&) const = default;
+};
+
 /// [[bodies]]: rigid, held or moved as prescribed
 struct BodySettings {
   enum class Shape { sphere, ellipsoid, file };
@@ -225,12 +241,15 @@ struct Case {
   std::vector<BoundarySettings> boundaries;
   std::vector<CellTypeSettings> cell_types;
   std::vector<CellSettings> cells;
+  std::vector<PopulationSettings> populations;
   std::vector<BodySettings> bodies;
   std::optional<CouplingSettings> coupling;
   std::optional<ContactSettings> contact;
   std::optional<BloodSettings> blood;
   std::optional<StretchingSettings> stretching;
   OutputSettings output;
+
+  bool has_cells() const { return !cells.empty() || !populations.empty(); }
 };
 
 /// Read and check a case file.

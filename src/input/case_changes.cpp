@@ -30,7 +30,7 @@ Values values_of(const std::string& resolved) {
     if (cut == std::string::npos) continue;
     values.emplace_back((section.empty() ? "" : section + ".") + line.substr(0, cut), line.substr(cut + 3));
   }
-  for (const char* list : {"boundary", "cells", "bodies"})
+  for (const char* list : {"boundary", "cells", "populations", "bodies"})
     values.emplace_back(std::string("number of [[") + list + "]]", std::to_string(entries[list]));
   return values;
 }
@@ -48,6 +48,7 @@ bool only_of_the_run(const std::string& key) {
 
 bool is_geometry(const std::string& key) {
   if (starts_with(key, "number of") || starts_with(key, "grid.")) return true;
+  if (starts_with(key, "populations.")) return true;  // packed anew they would be other cells
   if (starts_with(key, "bodies.")) return true;  // moved as prescribed from the start: another velocity is another place
   if (starts_with(key, "boundary.")) return ends_with(key, ".side") || ends_with(key, ".type");
   if (!starts_with(key, "cells.") && !starts_with(key, "cell_types.")) return false;

@@ -50,6 +50,19 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
                "membrane_viscosity_N_s_per_m", "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
 }
 
+/// Cells that the program places.
+void check_populations(const Case& scene, const Complaint& complain) {
+  for (std::size_t p = 0; p < scene.populations.size(); ++p) {
+    const CellSettings& cell = scene.cell_types[scene.populations[p].type].cell;
+    if (scene.coupling->scheme != CouplingSettings::Scheme::force)
+      complain(fmt::format("populations.{}", p), "",
+               "cells are packed only as membranes that are forces: set coupling.scheme = \"force\", or place them one by one in [[cells]]");
+    if (cell.membrane_viscosity_N_s_per_m > 0)
+      complain(fmt::format("cell_types.{}", cell.type), "membrane_viscosity_N_s_per_m",
+               "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
+  }
+}
+
 /// What pushes cells from outside must have something that holds them.
 void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
   Triple sum{};
@@ -136,7 +149,8 @@ void check_modules(const Case& scene, const Complaint& complain) {
                                                              {!scene.bodies.empty(), "bodies"},
                                                              {scene.coupling.has_value(), "coupling"},
                                                              {scene.contact.has_value(), "contact"},
-                                                             {scene.blood.has_value(), "blood"}})
+                                                             {scene.blood.has_value(), "blood"},
+                                                             {!scene.populations.empty(), "populations"}})
       if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
     if (scene.cells.size() != 1)
       complain("stretching", "",
@@ -149,20 +163,21 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (!scene.fluid && !scene.bodies.empty()) complain("bodies", "", "rigid bodies need a [fluid]");
   if (!scene.fluid && !scene.boundaries.empty()) complain("boundary", "", "boundaries need a [fluid]");
   if (!scene.fluid && scene.grid) complain("grid", "", "a grid without a [fluid] has no use");
-  if (!scene.fluid) complain(scene.cells.empty() ? "" : "cells", "", "nothing to compute: add [fluid] or [stretching]");
+  if (!scene.fluid) complain(!scene.cells.empty() ? "cells" : scene.populations.empty() ? "" : "populations", "", "nothing to compute: add [fluid] or [stretching]");
   if (!scene.grid) complain("fluid", "", "a fluid needs a [grid]");
-  if (scene.coupling && scene.cells.empty())
+  if (scene.coupling && !scene.has_cells())
     complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
   if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) check_force_scheme(scene, complain);
   if (scene.contact && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
     complain("contact", "",
-             scene.cells.empty() ? "there are no [[cells]] to touch each other: leave this section out"
+             !scene.has_cells() ? "there are no [[cells]] to touch each other: leave this section out"
                                  : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
   if (scene.blood && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
     complain("blood", "",
-             scene.cells.empty() ? "there are no [[cells]] to measure: leave this section out"
+             !scene.has_cells() ? "there are no [[cells]] to measure: leave this section out"
                                  : "blood is measured where the fluid is everywhere, in cells too: set coupling.scheme = \"force\", or leave "
                                    "this section out");
+  check_populations(scene, complain);
   check_boundaries(scene, complain);
 }
 

@@ -39,8 +39,9 @@ class CaseReader {
     const bool placed = scene.fluid.has_value();
     each("cell_types", [&](Section& s) { scene.cell_types.push_back(read_cell_type(s, scene.cell_types)); });
     each("cells", [&](Section& s) { scene.cells.push_back(read_cell(s, scene.cell_types, placed)); });
+    each("populations", [&](Section& s) { scene.populations.push_back(read_population(s, scene.cell_types)); });
     each("bodies", [&](Section& s) { scene.bodies.push_back(read_body(s)); });
-    const bool coupled = scene.fluid && !scene.cells.empty();
+    const bool coupled = scene.fluid && scene.has_cells();
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
     if (root_.contains("contact")) scene.contact = one<ContactSettings>("contact", read_contact);
     if (root_.contains("blood")) scene.blood = one<BloodSettings>("blood", read_blood);
@@ -52,7 +53,7 @@ class CaseReader {
     }
     read_time_section(scene);
     check_sampling(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
-    const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
+    const bool has_fluid = scene.fluid.has_value(), has_surfaces = scene.has_cells() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
     scene.resolved = echo_;
     return scene;
@@ -135,10 +136,11 @@ class CaseReader {
   }
 
   static void note_without_contact(Case& scene) {
-    if (scene.contact || scene.cells.size() < 2) return;
+    if (scene.contact || (scene.cells.size() < 2 && scene.populations.empty())) return;
+    const std::string number = scene.populations.empty() ? std::to_string(scene.cells.size()) : "many";
     scene.remarks.push_back(
         fmt::format("there are {} cells and no [contact]: nothing but the fluid keeps them apart, and that they cross would not be "
-                    "seen; add [contact]", scene.cells.size()));
+                    "seen; add [contact]", number));
   }
 
   template <class Settings, class Read>

@@ -153,19 +153,10 @@ std::vector<std::string> known_constants(const Section& s) {
 
 /// The constants of the type that the cell names.
 CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
-  const std::string name = s.text("type");
-  std::vector<std::string> names;
-  for (const auto& type : types) names.push_back(type.name);
-  const auto at = std::find(names.begin(), names.end(), name);
   if (types.empty())
     s.fail("type",
            "the case has no [[cell_types]]: add one with this name, or leave out type and give the cell's keys here");
-  if (at == names.end()) {
-    const auto like = nearest(name, names);
-    s.fail("type", fmt::format("unknown cell type; known: \"{}\"{}", fmt::join(names, "\", \""),
-                               like.empty() ? "" : fmt::format("; did you mean \"{}\"?", like)));
-  }
-  const CellSettings& cell = types[at - names.begin()].cell;
+  const auto& [name, cell] = types[read_type(s, types)];
   const auto constants = known_constants(s);
   for (const auto& key : s.present())
     if (std::find(constants.begin(), constants.end(), key) != constants.end())
@@ -177,6 +168,19 @@ CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
 }
 
 }  // namespace
+
+int read_type(Section& s, const std::vector<CellTypeSettings>& types) {
+  const std::string name = s.text("type");
+  std::vector<std::string> names;
+  for (const auto& type : types) names.push_back(type.name);
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at == names.end()) {
+    const auto like = nearest(name, names);
+    s.fail("type", fmt::format("unknown cell type; known: \"{}\"{}", fmt::join(names, "\", \""),
+                               like.empty() ? "" : fmt::format("; did you mean \"{}\"?", like)));
+  }
+  return static_cast<int>(at - names.begin());
+}
 
 CellTypeSettings read_cell_type(Section& s, const std::vector<CellTypeSettings>& known) {
   CellTypeSettings type;

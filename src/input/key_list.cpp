@@ -80,6 +80,7 @@ Read reader_of(const std::string& name) {
       s.describe("type", "the name of one of [[cell_types]], which then has the keys that all its cells share", "");
       read_cell(s, {}, true);
     };
+  if (name == "populations") return [](Section& s) { read_population(s, {}); };
   if (name == "bodies") return read_body;
   if (name == "coupling") return read_coupling;
   if (name == "contact") return read_contact;

@@ -57,6 +57,7 @@ class Section {
 
   /// From now on every key is recorded, and nothing is refused or missed.
   void record_into(KeyRecorder& recorder) { recorder_ = &recorder; }
+  bool recording() const { return recorder_ != nullptr; }
   /// Of a key that is read by other means than those below.
   /// @param value  default as TOML; "" for a key that may be left out
   void describe(const std::string& key, const std::string& allowed, const std::string& value) { record(key, allowed, value, true); }

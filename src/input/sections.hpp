@@ -18,6 +18,8 @@ CellTypeSettings read_cell_type(Section& s, const std::vector<CellTypeSettings>&
 /// @param types   that it may name instead of keys of its own
 /// @param placed  there is a fluid, so the cell must say where it is
 CellSettings read_cell(Section& s, const std::vector<CellTypeSettings>& types, bool placed);
+/// @param types  that it may name
+PopulationSettings read_population(Section& s, const std::vector<CellTypeSettings>& types);
 BodySettings read_body(Section& s);
 CouplingSettings read_coupling(Section& s);
 ContactSettings read_contact(Section& s);
@@ -25,6 +27,8 @@ BloodSettings read_blood(Section& s);
 StretchingSettings read_stretching(Section& s);
 OutputSettings read_output(Section& s, bool has_fluid, bool has_surfaces);
 
+/// The key "type": which of the cell types it names. @throws InputError  none
+int read_type(Section& s, const std::vector<CellTypeSettings>& types);
 /// The key must name an OFF or STL file; "" is none.
 void check_surface_file(Section& s, const std::string& key, const std::string& path);
 /// The key "axis": a direction, by default z.

@@ -55,6 +55,11 @@ Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Wo
   hold({}, 0);
 }
 
+void Membranes::call(const CellNames& names) {
+  names_ = names;
+  views_.surface.names = &names_;
+}
+
 /// What messages, the history and the sub-steps ask of each cell.
 void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
   law_.clear(), vertex_mass_.clear(), vertex_area_.clear(), rest_area_.clear(), rest_volume_.clear(), number_.clear();
@@ -70,6 +75,8 @@ void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
     holds_area_.push_back(type.law.area > 0);
   }
 }
+
+void Membranes::rest_at_size(double size) { fill_reference(views_, types_, size); }
 
 void Membranes::make_room(const SurfaceSet& needed) {
   SurfaceSet& set = views_.surface;

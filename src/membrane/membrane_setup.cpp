@@ -19,38 +19,6 @@ Array<T> to_device(const char* name, const std::vector<T>& values) {
   return view;
 }
 
-void fill_reference(MembraneViews& m, const std::vector<CellReference>& types) {
-  std::vector<CellLaw> law;
-  std::vector<int> first{0};
-  std::vector<double> rest_area;
-  for (const CellReference& type : types) {
-    law.push_back(type.law);
-    first.push_back(first.back() + int(type.mesh.triangles.size()));
-    rest_area.insert(rest_area.end(), type.rest_area.begin(), type.rest_area.end());
-  }
-  m.law = to_device("law_type", law);
-  m.type_first_triangle = to_device("type_first_triangle", first);
-  m.rest_area = to_device("rest_area", rest_area);
-  m.rest_length = Components<double>(label("rest_length"), rest_area.size(), 3);
-  m.rest_cos = Components<double>(label("rest_cos"), rest_area.size(), 3);
-  m.rest_sin = Components<double>(label("rest_sin"), rest_area.size(), 3);
-  auto length = Kokkos::create_mirror_view(m.rest_length);
-  auto cosine = Kokkos::create_mirror_view(m.rest_cos), sine = Kokkos::create_mirror_view(m.rest_sin);
-  int t = 0;
-  for (const CellReference& type : types) {
-    for (std::size_t local = 0; local < type.rest_area.size(); ++local, ++t) {
-      for (int k = 0; k < 3; ++k) {
-        length(t, k) = type.rest_length[local][k];
-        cosine(t, k) = std::cos(type.rest_angle[local][k]);
-        sine(t, k) = std::sin(type.rest_angle[local][k]);
-      }
-    }
-  }
-  Kokkos::deep_copy(m.rest_length, length);
-  Kokkos::deep_copy(m.rest_cos, cosine);
-  Kokkos::deep_copy(m.rest_sin, sine);
-}
-
 /// The constants of all types that have the law; the others' places stay empty.
 template <class Law>
 Array<Law> constants(const std::vector<CellReference>& types) {
@@ -74,6 +42,40 @@ std::unique_ptr<Elasticity> elasticity_of(const MembraneLaw& law, const std::vec
 }
 
 }  // namespace
+
+void fill_reference(MembraneViews& m, const std::vector<CellReference>& types, double size) {
+  std::vector<CellLaw> law;
+  std::vector<int> first{0};
+  std::vector<double> rest_area;
+  for (const CellReference& type : types) {
+    law.push_back(type.law);
+    law.back().rest_area *= size * size;
+    law.back().rest_volume *= size * size * size;
+    first.push_back(first.back() + int(type.mesh.triangles.size()));
+    for (const double area : type.rest_area) rest_area.push_back(size * size * area);
+  }
+  m.law = to_device("law_type", law);
+  m.type_first_triangle = to_device("type_first_triangle", first);
+  m.rest_area = to_device("rest_area", rest_area);
+  m.rest_length = Components<double>(label("rest_length"), rest_area.size(), 3);
+  m.rest_cos = Components<double>(label("rest_cos"), rest_area.size(), 3);
+  m.rest_sin = Components<double>(label("rest_sin"), rest_area.size(), 3);
+  auto length = Kokkos::create_mirror_view(m.rest_length);
+  auto cosine = Kokkos::create_mirror_view(m.rest_cos), sine = Kokkos::create_mirror_view(m.rest_sin);
+  int t = 0;
+  for (const CellReference& type : types) {
+    for (std::size_t local = 0; local < type.rest_area.size(); ++local, ++t) {
+      for (int k = 0; k < 3; ++k) {
+        length(t, k) = size * type.rest_length[local][k];
+        cosine(t, k) = std::cos(type.rest_angle[local][k]);
+        sine(t, k) = std::sin(type.rest_angle[local][k]);
+      }
+    }
+  }
+  Kokkos::deep_copy(m.rest_length, length);
+  Kokkos::deep_copy(m.rest_cos, cosine);
+  Kokkos::deep_copy(m.rest_sin, sine);
+}
 
 MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
                                   const std::vector<int>& type_of_cell) {

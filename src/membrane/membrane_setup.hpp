@@ -16,6 +16,9 @@ namespace corpuscle {
 MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
                                   const std::vector<int>& type_of_cell);
 
+/// The rest states of all types as if their cells were `size` times as large.
+void fill_reference(MembraneViews& m, const std::vector<CellReference>& types, double size = 1);
+
 /// The kernels of the cells' in-plane laws: one set for a scene of one law, further ones for each further law.
 /// @param type_of_cell  [cell] index into types
 std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell);

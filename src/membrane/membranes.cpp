@@ -235,7 +235,7 @@ void Membranes::explain(int cell, double dt) {
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   const CellDiagnostics before = diagnostics()[cell];
   const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
-  const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", number_[cell], before.centroid_um[0],
+  const std::string where = fmt::format("{} at ({:.2f}, {:.2f}, {:.2f}) um", name(cell), before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
   const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
   const std::string step =

@@ -61,6 +61,8 @@ class Membranes {
   /// Allocates where there is no room, with some to spare. Arrays of what vertices carry keep their content, row by row; what
   /// does not belong there any more is for the caller to replace.
   void hold(const std::vector<HeldCell>& cells, int own);
+  /// Rest states as if all cells were `size` times as large as their types are.
+  void rest_at_size(double size);
   /// What belongs to the own cells' vertices from one step to the next, and travels with them: [vertex, 3] each.
   std::vector<Components<double>> carried() const { return {views_.surface.x, views_.surface.v}; }
   const std::vector<CellReference>& types() const { return types_; }
@@ -77,6 +79,9 @@ class Membranes {
   const MembraneLaw& law(int cell) const { return law_[cell]; }
   /// Of a cell in the whole scene.
   int number(int cell) const { return number_[cell]; }
+  /// As the case file addresses it.
+  std::string name(int cell) const { return names_.of(number_[cell]); }
+  void call(const CellNames& names);
   /// Whether anything but its in-plane law answers a change of a cell's area.
   bool holds_area(int cell) const { return holds_area_[cell]; }
   int cells() const { return views_.cells; }
@@ -173,6 +178,7 @@ class Membranes {
   SurfaceSet templates_;                         // one body for each type; only with hold()
   std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
   std::vector<int> number_;                      // [cell] in the whole scene
+  CellNames names_;
   std::vector<bool> holds_area_;                 // [cell]
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
   std::vector<MembraneLaw> law_;                 // [cell]

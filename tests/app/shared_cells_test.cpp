@@ -80,6 +80,33 @@ TEST_CASE("of many cells the history has the means, and cells.h5 what each does"
 #endif
 }
 
+TEST_CASE("check, a run and its report say what a population has become, and a restart keeps to it") {
+  const auto folder = fresh_folder("populations");
+  const std::string name = write_case(folder, 1).string();
+  {
+    std::ofstream more(name, std::ios::app);
+    more << "[contact]\n[[populations]]\ntype = \"small\"\nhematocrit = 0.1\n";
+  }
+  for (const char* word : {"check", "run"}) {
+    Words words{word, name};
+    if (std::string(word) == "run") words.insert(words.end(), {"--out", "one"});
+    const auto outcome = succeed(folder, words, {1, 1});
+    CHECK_THAT(outcome.output, Catch::Contains("populations.0: 26 cells \"small\", hematocrit 0.09") && Catch::Contains("asked for 0.1") &&
+                                   Catch::Contains("smallest gap between cells 0.1"));
+  }
+  const auto all = report(folder / "one");
+  CHECK(all["populations"][0]["cells"] == 26);
+  CHECK(all["populations"][0]["hematocrit"].get<double>() == Approx(0.1).margin(0.002));
+  CHECK(all["tube_hematocrit"].get<double>() > all["populations"][0]["hematocrit"].get<double>());
+  fail(folder, with({"check", name}, {"populations.0.hematocrit=0.75"}), 2, {"populations.0.hematocrit = 0.75", "do not fit"});
+#ifdef CORPUSCLE_HDF5
+  fail(folder, with({"run", name, "--out", "other", "--restart", "one/checkpoint.h5"}, {"time.end_us=90", "populations.0.seed=2"}), 2,
+       {"another scene", "populations.0.seed = 2"});
+  const auto outcome = succeed(folder, with({"run", name, "--out", "other", "--restart", "one/checkpoint.h5"}, {"time.end_us=90"}), {1, 1});
+  CHECK_THAT(outcome.output, Catch::Contains("populations.0: 26 cells"));
+#endif
+}
+
 TEST_CASE("few cells have lines of their own, whichever ranks have them") {
   const auto folder = fresh_folder("few_cells");
   const std::string name = write_case(folder, 5).string();

@@ -186,7 +186,7 @@ TEST_CASE("every block has the cells that reach into it, however they travel", "
   const Comm comm;
   const std::array<bool, 3> periodic{true, true, true};
   Grid grid(comm, make_node_source(*scene.grid), periodic);
-  SharedCells cells(scene.cells, grid, IndexSpace::halo, 0.0);
+  SharedCells cells(places_of(scene.cells), grid, IndexSpace::halo, 0.0);
   const IndexSpace& index = grid.index();
   const Triple velocity{0.15, -0.06, 0.11};  // um a step
   const auto find_missing = [&] {
@@ -228,7 +228,7 @@ TEST_CASE("every block has the cells that reach into it, however they travel", "
 TEST_CASE("parts found by copies add up to what the cell has, in the same order everywhere", "[coupling][cells][ranks]") {
   const Case scene = carried_capsules(15);
   Grid grid(Comm(), make_node_source(*scene.grid), {true, false, true});
-  SharedCells cells(scene.cells, grid, IndexSpace::halo, 0.0);
+  SharedCells cells(places_of(scene.cells), grid, IndexSpace::halo, 0.0);
   const SurfaceSet& set = cells.surfaces();
   // Every vertex has one, copies too: a cell's then has as many as there are of it.
   const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.v);

@@ -381,6 +381,29 @@ TEST_CASE("cell types are checked") {
   require_parts(types(rbc + cell, {"cell_types.vertices=500"}), {"cell_types.0.key=value"});
 }
 
+TEST_CASE("populations are checked") {
+  const std::string start = "[coupling]\nscheme = \"force\"\n[[cell_types]]\nname = \"rbc\"\n[[populations]]\n";
+  const auto with = [&](const std::string& keys, const std::string& before = "") {
+    return message(replaced(flow, "[fluid]\n", (before.empty() ? start : before) + keys + "[fluid]\n"));
+  };
+  const std::string rbc = "type = \"rbc\"\n";
+  REQUIRE(with(rbc + "hematocrit = 0.3\nseed = 4\ngap_um = 0.2\norientation = \"aligned\"\naxis = [1, 0, 0]\n") == "accepted");
+  REQUIRE(with(rbc + "count = 3\nlower_um = [0, 0, 0]\nupper_um = [2, 4, 4]\n") == "accepted");
+  require_parts(with("count = 3\n"), {":13: populations.0.type: required key is missing"});
+  require_parts(with("type = \"rcb\"\ncount = 3\n"), {":14: populations.0.type = \"rcb\"", "did you mean \"rbc\"?"});
+  require_parts(with(rbc), {":13: populations.0.hematocrit: required key is missing"});
+  require_parts(with(rbc + "count = 3\nhematocrit = 0.3\n"), {":15: populations.0.count", "leave out one of the two"});
+  require_parts(with(rbc + "hematocrit = 1.5\n"), {":15: populations.0.hematocrit = 1.5", "at most 0.8"});
+  require_parts(with(rbc + "count = 0\n"), {":15: populations.0.count = 0", "from 1 to"});
+  require_parts(with(rbc + "count = 3\ngap_um = -1\n"), {":16: populations.0.gap_um = -1", "from 0 to 2"});
+  require_parts(with(rbc + "count = 3\naxis = [1, 0, 0]\n"), {":16: populations.0.axis", "only orientation = \"aligned\""});
+  require_parts(with(rbc + "count = 3\nlower_um = [2, 0, 0]\nupper_um = [2, 4, 4]\n"), {":17: populations.0.upper_um", "above lower_um"});
+  require_parts(with(rbc + "count = 3\nhematcrit = 0.3\n"), {"populations.0.hematcrit", "did you mean 'hematocrit'?"});
+  require_parts(with(rbc + "count = 3\n", "[[cell_types]]\nname = \"rbc\"\n[[populations]]\n"),
+                {"populations.0", "coupling.scheme = \"force\"", "[[cells]]"});
+  require_parts(with(rbc + "count = 3\n", "[coupling]\nscheme = \"force\"\n[[populations]]\n"), {"populations.0.type", "no [[cell_types]]"});
+}
+
 TEST_CASE("a long value is shortened in a message") {
   std::string list = "[0";
   for (int i = 0; i < 60; ++i) list += ", 0";

@@ -1,0 +1,119 @@
+// How packed cells become membranes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/wall_contact.hpp"
+#include "core/error.hpp"
+#include "core/log.hpp"
+#include "coupling/force_coupling.hpp"
+#include "immersed/surface_geometry.hpp"
+#include "transfer/vertex_forces.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+constexpr double pace_us = 20;  // steps that contact is to follow: the longest that runs take
+
+}  // namespace
+
+void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, double contact_um) {
+  const Grid& grid = fluid_.grid();
+  const CellPlaces places = find_places(scene, grid, packed);
+  cells_ = std::make_unique<SharedCells>(places, grid, IndexSpace::halo, contact_um, workspace_);
+  membranes_ = &cells_->membranes();
+  if (scene.populations.empty()) return;
+  packing_ = report_of(scene, places, grid.total_volume());
+  packed_ = share_of(places, grid.comm());
+  packed_gap_ = 1e30;
+  for (const auto& population : scene.populations) packed_gap_ = std::min(packed_gap_, population.gap_um);
+  if (places.size == 1) return;
+  small_ = packed != nullptr;
+  grows_ = packed == nullptr;
+  packed_gap_ = 0;
+}
+
+std::vector<double> ForceCoupling::state() const {
+  if (!packed_ || packed_->size == 1) return {};
+  return {stable_us_};
+}
+
+/// Packing has seen points and tables: here is what the triangles themselves say.
+/// @throws InputError  for cells that are nearer to each other or to a side than they should be
+void ForceCoupling::check_packing() {
+  constexpr double reach = 0.3;     // um, beyond the gap asked for
+  constexpr double rounded = 0.01;  // um, of sides between nodes
+  const Comm& comm = fluid_.grid().comm();
+  ContactSettings settings;
+  settings.range_um = packed_gap_ + reach;
+  const ContactPeers peers{comm, [this] { cells_->to_copies(surfaces().x, true); }};
+  Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
+  contact.take_up(surfaces(), membranes_->templates(), membranes_->views().type);
+  contact.look_at_start(lengths_us_.front());
+  packing_->smallest_gap_um = contact.report().smallest_gap;
+  WallSides sides;
+  for (const auto& boundary : scene_.boundaries) {
+    const int side = static_cast<int>(boundary.side);
+    sides.wall[side / 2][side % 2] = boundary.type != BoundarySettings::Type::periodic;
+  }
+  const double to_side =
+      sides.any() ? least_wall_gap(transfer_->block().lattice, transfer_->views(), sides, settings.range_um) : 1e30;
+  packing_->smallest_wall_gap_um = comm.min(to_side);
+  if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
+  throw InputError(fmt::format("populations: two cells are {:.3g} um from each other, or one {:.3g} um from a side, and gap_um = {:g} is asked "
+                               "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
+                               packing_->smallest_gap_um, packing_->smallest_wall_gap_um, packed_gap_));
+}
+
+/// Where shapes at rest have no room, membranes grow to their size from the largest that have, as contact and their own forces
+/// move them.
+/// @throws InputError  if they cannot
+void ForceCoupling::inflate() {
+  constexpr double growth = 1.001;  // a step: some nm
+  constexpr int settling = 200;     // steps at the end
+  double size = packed_->size, mobility = 0;
+  info("packing:  shapes at rest fit with {:.3f} of their size; they grow on as membranes", size);
+  const auto still = [this] { Kokkos::deep_copy(surfaces().v, 0.0); };
+  try {
+    cells_->to_copies(surfaces().x, true);
+    still();
+    loads_->look(0, pace_us);
+    long step = 0;
+    for (; size < 1; ++step) {
+      size = std::min(1.0, growth * size);
+      settle_membranes(size, mobility, step);
+    }
+    for (int n = 0; n < settling; ++n) settle_membranes(1, mobility, ++step);
+  } catch (const ComputationError& error) {
+    throw InputError(fmt::format("populations: the cells do not fit, even as membranes that bend: at {:.3f} of their size, which is hematocrit "
+                                 "{:.3f} of {:.3f}, {}; ask for less, or for a wider grid",
+                                 size, packing_->tube_hematocrit * size * size * size, packing_->tube_hematocrit, error.what()));
+  }
+  still();
+  membranes_->rest_at_size(1);
+  loads_->resume(ContactReport());
+  grows_ = false;
+}
+
+/// One step without a fluid: every vertex has the same mobility, um/us/nN.
+void ForceCoupling::settle_membranes(double size, double& mobility, long step) {
+  constexpr double share = 0.5;  // of what the stiffest mode can follow
+  constexpr long every = 100;
+  const Comm& comm = fluid_.grid().comm();
+  membranes_->rest_at_size(size);
+  begin_step(0, pace_us, 0);
+  if (step % every == 0) mobility = share / (pace_us * comm.max(membranes_->cells() > 0 ? membranes_->largest_stiffness_nN_per_um() : 0));
+  membranes_->set_out(0);
+  cells_->to_copies(surfaces().x, true);
+  together([&] { membranes_->compute_forces(); });
+  update_surface_geometry(surfaces());
+  place(0);
+  loads_->gather(pace_us, false);
+  scale_forces(membranes_->vertices(), mobility, loads_->force(), surfaces().v);
+  together([&] { membranes_->drift(pace_us, 0); });
+  after_move(0, pace_us);
+}
+
+}  // namespace corpuscle
