@@ -4,13 +4,9 @@
 #include "common/sums.hpp"
 #include "fluid/momentum.hpp"
 #include "grid/halo_copy.hpp"
+#include "grid/wall_sides.hpp"
 
 namespace corpuscle {
-
-/// [direction][low, high] whether that side of the block is a wall.
-struct WallSides {
-  bool wall[3][2] = {};
-};
 
 /// Force of the fluid on a wall's face, along it, nN: what the momentum equation takes from the cell beside it, so that all of
 /// them together hold what drives the flow. Where the wall's stress is wanted no better derivative is: in a steady flow along

@@ -3,17 +3,10 @@
 
 #include "common/extremes.hpp"
 #include "contact/contact_law.hpp"
+#include "grid/wall_sides.hpp"
 #include "transfer/marker_views.hpp"
 
 namespace corpuscle {
-
-/// [direction][low, high] sides that membranes must not touch.
-struct WallSides {
-  bool wall[3][2] = {};
-  KOKKOS_INLINE_FUNCTION bool any() const {
-    return wall[0][0] || wall[0][1] || wall[1][0] || wall[1][1] || wall[2][0] || wall[2][1];
-  }
-};
 
 /// Distance to a side, and inward across it.
 struct WallGap {
