@@ -171,6 +171,7 @@ CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
 
 int read_type(Section& s, const std::vector<CellTypeSettings>& types) {
   const std::string name = s.text("type");
+  if (!s.has("type")) return 0;  // finish() says that it is missing
   std::vector<std::string> names;
   for (const auto& type : types) names.push_back(type.name);
   const auto at = std::find(names.begin(), names.end(), name);

@@ -16,8 +16,8 @@ void read_amount(Section& s, PopulationSettings& p) {
     s.describe("count", "a whole number: how many cells; or hematocrit", "");
     return;
   }
-  const bool counted = s.has("count");
-  if (counted && s.has("hematocrit")) s.fail("count", "hematocrit says already how many cells there are: leave out one of the two");
+  const bool given = s.node("hematocrit"), counted = s.node("count");
+  if (counted && given) s.fail("count", "hematocrit says already how many cells there are: leave out one of the two");
   if (counted) {
     p.count = s.integer("count", 1, most_cells);
     return;
@@ -28,7 +28,7 @@ void read_amount(Section& s, PopulationSettings& p) {
 void read_box(Section& s, PopulationSettings& p) {
   const Bounds anywhere = between(-most_um, most_um);
   for (const auto& [key, corner] : {std::pair{"lower_um", &p.lower_um}, {"upper_um", &p.upper_um}}) {
-    if (s.has(key))
+    if (s.node(key))
       *corner = s.triple(key, anywhere);
     else
       s.describe(key, "three numbers: a corner of the box within which its cells start", "");

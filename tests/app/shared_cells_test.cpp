@@ -91,11 +91,11 @@ TEST_CASE("check, a run and its report say what a population has become, and a r
     Words words{word, name};
     if (std::string(word) == "run") words.insert(words.end(), {"--out", "one"});
     const auto outcome = succeed(folder, words, {1, 1});
-    CHECK_THAT(outcome.output, Catch::Contains("populations.0: 26 cells \"small\", hematocrit 0.09") && Catch::Contains("asked for 0.1") &&
+    CHECK_THAT(outcome.output, Catch::Contains("populations.0: 28 cells \"small\", hematocrit 0.09") && Catch::Contains("asked for 0.1") &&
                                    Catch::Contains("smallest gap between cells 0.1"));
   }
   const auto all = report(folder / "one");
-  CHECK(all["populations"][0]["cells"] == 26);
+  CHECK(all["populations"][0]["cells"] == 28);
   CHECK(all["populations"][0]["hematocrit"].get<double>() == Approx(0.1).margin(0.002));
   CHECK(all["tube_hematocrit"].get<double>() > all["populations"][0]["hematocrit"].get<double>());
   fail(folder, with({"check", name}, {"populations.0.hematocrit=0.75"}), 2, {"populations.0.hematocrit = 0.75", "do not fit"});
@@ -103,7 +103,7 @@ TEST_CASE("check, a run and its report say what a population has become, and a r
   fail(folder, with({"run", name, "--out", "other", "--restart", "one/checkpoint.h5"}, {"time.end_us=90", "populations.0.seed=2"}), 2,
        {"another scene", "populations.0.seed = 2"});
   const auto outcome = succeed(folder, with({"run", name, "--out", "other", "--restart", "one/checkpoint.h5"}, {"time.end_us=90"}), {1, 1});
-  CHECK_THAT(outcome.output, Catch::Contains("populations.0: 26 cells"));
+  CHECK_THAT(outcome.output, Catch::Contains("populations.0: 28 cells"));
 #endif
 }
 

@@ -88,7 +88,7 @@ Case squeezed(double end_us) {
 
 struct Outcome {
   std::vector<double> x;
-  long moves = 0, cells = 0;
+  long moves = 0, cells = 0, total = 0;
   ContactReport contact;
 };
 
@@ -99,6 +99,7 @@ Outcome finish(FlowSimulation& simulation) {
   result.x = positions(simulation);
   result.moves = comm.sum(simulation.shared_cells()->moves());
   result.cells = comm.sum(static_cast<long>(simulation.shared_cells()->own().size()));
+  result.total = simulation.cells();
   result.contact = *simulation.coupling()->contact_report();
   return result;
 }
@@ -112,13 +113,14 @@ Outcome run(const Comm& comm, const Case& scene) {
 }  // namespace
 
 TEST_CASE("packed cells cross ranks and periodic sides, touch, and none is lost", "[coupling][cells][populations][ranks]") {
-  const Case scene = crowd(3000);
+  const Case scene = crowd(1800);
   const Outcome shared = run(Comm(), scene);
-  CHECK(shared.cells == 24 + 18);  // 0.2 and 0.1 of 256 um3, of 2.1 and 1.4 um3 each
+  CHECK(shared.cells == shared.total);
+  CHECK(shared.total > 40);  // 0.2 and 0.1 of 256 um3, of less than 2.2 and 1.5 um3 each
   CHECK(shared.contact.crossings == 0);
   CHECK(shared.contact.smallest_gap < scene.contact->range_um);
   CHECK(shared.contact.smallest_gap > 0);
-  CHECK(shared.moves > 4 * Comm().size());
+  CHECK(shared.moves > 2 * Comm().size());
   if (Comm().size() == 1) return;
   const Outcome one = run(Comm::alone(), scene);
   if (std::getenv("CORPUSCLE_SHOW"))
@@ -148,7 +150,7 @@ TEST_CASE("a cell that has no room at rest grows to its size as a membrane", "[c
 #ifdef CORPUSCLE_HDF5
 TEST_CASE("a restart does not pack again", "[coupling][populations][ranks]") {
   const bool tight = GENERATE(false, true);
-  const Case scene = tight ? squeezed(60) : crowd(180);
+  const Case scene = tight ? squeezed(60) : crowd(120);
   const SharedFile file("populations");
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
