@@ -57,14 +57,15 @@ KOKKOS_INLINE_FUNCTION bool reaches(const MarkerSearch& s, const double (&eta)[3
   return near && !beyond;
 }
 
-/// The image's place in the lattice, from a guess if there is one. @returns false if it is not to be found
-KOKKOS_INLINE_FUNCTION bool locate_image(const Lattice& lattice, const Vec3& p, bool guessed, LatticePoint& q) {
-  if (!guessed || lattice.locate(p, q) != Located::inside) {  // it may have been carried round a periodic direction
+/// The image's place in the lattice, from a guess if there is one. @returns `outside` for one whose place is extrapolated
+KOKKOS_INLINE_FUNCTION Located locate_image(const Lattice& lattice, const Vec3& p, bool guessed, LatticePoint& q) {
+  Located found = guessed ? lattice.locate(p, q) : Located::failed;
+  if (found != Located::inside) {  // it may have been carried round a periodic direction
     lattice.coarse_start(p, q);
-    if (lattice.locate(p, q) == Located::failed) return false;
+    found = lattice.locate(p, q);
   }
-  lattice.polish(p, q);
-  return true;
+  if (found != Located::failed) lattice.polish(p, q);
+  return found;
 }
 
 KOKKOS_INLINE_FUNCTION Vec3 image_position(const PeriodImages& images, const Vec3& x, int m) { return x + images.shift[m]; }
@@ -88,7 +89,7 @@ inline void find_images(const MarkerSearch& search, const Components<double>& x,
         const double xi[3] = {out.xi(v, 0), out.xi(v, 1), out.xi(v, 2)};
         const int from = out.image(v);
         unsigned mask = 0;
-        int found = -1;
+        int found = -1, better = 0;  // what reaches this rank's faces before what is in the lattice at all
         for (int m = 0; m < s.images.count; ++m) {
           const Vec3 p = image_position(s.images, here, m);
           if (!(p.x >= s.lower.x && p.x <= s.upper.x && p.y >= s.lower.y && p.y <= s.upper.y && p.z >= s.lower.z &&
@@ -96,15 +97,16 @@ inline void find_images(const MarkerSearch& search, const Components<double>& x,
             continue;
           LatticePoint q;
           if (from >= 0) image_guess(s, xi, from, m, q);
-          if (!locate_image(s.lattice, p, from >= 0, q)) continue;
+          const Located located = locate_image(s.lattice, p, from >= 0, q);
+          if (located == Located::failed) continue;
           double eta[3];
           lattice_to_index(s.lattice, q, eta);
           bool outside;
           if (reaches(s, eta, outside)) mask |= 1u << m;
           if (outside) Kokkos::atomic_fetch_min(&out.beyond(0), v);
-          if (found >= 0 && !(mask >> m & 1u)) continue;
-          if (found >= 0 && (mask >> found & 1u)) continue;
-          found = m;
+          const int good = mask >> m & 1u ? 3 : (located == Located::inside ? 2 : 1);
+          if (good <= better) continue;
+          found = m, better = good;
           for (int d = 0; d < 3; ++d) out.xi(v, d) = q.xi(d);
         }
         out.image(v) = found;

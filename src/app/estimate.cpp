@@ -149,6 +149,8 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
   const double krylov = 5 * 12;                                         // FluidSolver::Momentum
   const double search = surfaces ? 51 : 0;                              // ImmersedBoundary
+  const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
+  const double cytosol = ratios ? 8 + 3 * 4 : 0;                        // Cytosol
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;
@@ -158,7 +160,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   MemoryEstimate mb;
   mb.program = ranks > 1 ? 36 : 32;
   if (scene.grid) {
-    mb.fields = (nodes * (grid + solver + krylov + search + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
+    mb.fields = (nodes * (grid + solver + krylov + search + cytosol + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
     mb.multigrid = nodes * cycles * levels_over_finest(size) / bytes_per_mb;
     if (size.skewed) mb.pressure_matrix = owned * matrix / bytes_per_mb;
     // A vector of every node in the order of the file, on the device and on the host.

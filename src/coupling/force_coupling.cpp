@@ -15,6 +15,19 @@
 
 namespace corpuscle {
 
+namespace {
+
+/// Along index direction d: the grid's volume over the area that it is swept with.
+double mean_spacing(const Grid& grid, int d) {
+  const IndexSpace index = grid.index();
+  const Components<double> area = grid.views().face_area[d];
+  const double swept = sum_owned("corpuscle::coupling::swept_area", index,
+                                 KOKKOS_LAMBDA(int i, int j, int k) { return norm(load(area, index.cell(i, j, k))); });
+  return grid.total_volume() / grid.comm().sum(swept);
+}
+
+}  // namespace
+
 ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers)
     : scene_(scene),
       fluid_(fluid),
@@ -26,6 +39,12 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   const int vertices = membranes_->vertices();
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, vertices);
   fluid.set_face_force(transfer_->faces());
+  if (std::any_of(scene.cells.begin(), scene.cells.end(), [](const CellSettings& c) { return c.viscosity_ratio != 1; })) {
+    std::vector<double> ratios;
+    for (const auto& cell : scene.cells) ratios.push_back(cell.viscosity_ratio);
+    cytosol_ = std::make_unique<Cytosol>(fluid.grid(), ratios);
+    fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least());
+  }
   fluid.raise_reference_speed(quiet_speed_);
   traction_ = Components<double>("corpuscle::coupling::traction", vertices, 3);
   Kokkos::deep_copy(membranes_->views().force, 0.0);
@@ -75,11 +94,24 @@ void ForceCoupling::place(double time) {
   outflow_ = {least, static_cast<int>(vertex)};
 }
 
+/// The viscosity, with the membranes where place() found them.
+/// @throws ComputationError  if there is no saying what is inside them
+void ForceCoupling::fill_cells(double time) {
+  if (!cytosol_) return;
+  cytosol_->update(*transfer_, surfaces());
+  if (cytosol_->broken())
+    throw ComputationError(
+        fmt::format("what is inside the cells cannot be told at {:.6g} us: a triangle of a membrane reaches over more than two "
+                    "spacings of the grid. Use more vertices (cells.vertices) or a coarser grid (grid.nodes)",
+                    time));
+}
+
 void ForceCoupling::check_start() {
   wrap();
   coarse_ = check_surfaces(fluid_.grid(), scene_, surfaces());
   try {
     place(0);
+    fill_cells(0);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
@@ -96,6 +128,7 @@ void ForceCoupling::check_start() {
         nearest_outflow(), outflow_limit_);
   }
   measure_stability();
+  find_softest();
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (!(longest <= stable_us_))
     throw InputError(
@@ -114,6 +147,14 @@ bool ForceCoupling::second_order(double dt) const {
   return dt <= margin * stable_us_;
 }
 
+/// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the
+/// outer one, which is all that resists the slip.
+double ForceCoupling::resisting_share() const {
+  double share = 1;
+  for (const auto& cell : scene_.cells) share = std::min(share, 0.5 * (1 + cell.viscosity_ratio));
+  return share;
+}
+
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
 /// kernel, and the slip, which has no interaction and is largest for the finest modes.
@@ -123,7 +164,7 @@ void ForceCoupling::measure_stability() {
   const bool three = scene_.coupling->kernel == CouplingSettings::Kernel::three_point;
   update_surface_geometry(surfaces());
   MobilityModel model;
-  model.viscosity = fluid_.viscosity();
+  model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = (three ? 0.91 : 1.25) * spacing;  // of a marker alone: Delong et al., J. Chem. Phys. 140, 2014
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
   stable_us_ = limit / membranes_->fastest_relaxation_per_us(model);
@@ -168,18 +209,53 @@ void ForceCoupling::collect() {
   velocity_host_.write();
 }
 
+/// How the fluid's force on membranes changes with their velocity, per area, where it does so least: the largest deformation of
+/// one cell alone (a quadrupole of its size), or of all cells together, as the longest shear wave that the grid has room for.
+double ForceCoupling::anticipated_reaction(double dt) const {
+  const Softest& s = softest_;
+  if (s.area == 0) return 0;
+  const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;
+  const double depth = fluid_.grid().total_volume() / s.area;
+  return std::min(3 * mu / s.radius, depth * (mu * s.wave_number_square + rho / dt));
+}
+
+void ForceCoupling::find_softest() {
+  if (!membranes_->viscosity()) return;
+  const double pi = std::acos(-1.0);
+  const Grid& grid = fluid_.grid();
+  double largest = 0;
+  for (const auto& cell : membranes_->diagnostics()) {
+    softest_.area += cell.area_um2;
+    largest = std::max(largest, cell.area_um2);
+  }
+  softest_.radius = std::sqrt(largest / (4 * pi));
+  double longest = 0, square = 0;
+  for (int d = 0; d < 3; ++d) {
+    const double length = grid.index().global[d] * mean_spacing(grid, d);
+    longest = std::max(longest, length);
+    const auto held = [&](const BoundarySettings& b) {
+      return static_cast<int>(b.side) / 2 == d && (b.type == BoundarySettings::Type::wall || b.type == BoundarySettings::Type::moving_wall);
+    };
+    if (std::count_if(scene_.boundaries.begin(), scene_.boundaries.end(), held) == 2) square += std::pow(pi / length, 2);
+  }
+  softest_.wave_number_square = square > 0 ? square : std::pow(2 * pi / longest, 2);
+}
+
 StepStatistics ForceCoupling::advance(double time, double dt) {
   const SurfaceSet& set = surfaces();
   {
     const auto scope = timers_.scope("membrane");
     wrap();
     membranes_->set_out(second_order(dt) ? dt : 0);
+    membranes_->remember_forces();
     membranes_->compute_forces();
+    membranes_->resist(anticipated_reaction(dt));
     update_surface_geometry(set);
   }
   {
     const auto scope = timers_.scope("transfer");
     place(time);
+    fill_cells(time);
     transfer_->spread(membranes_->views().force);
   }
   fluid_.solve(time + dt, nullptr);
@@ -224,16 +300,28 @@ std::vector<Triple> ForceCoupling::wrapped_by() const {
 }
 
 std::vector<double> ForceCoupling::state() const {
-  if (!laps_.data()) return {};
-  const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), laps_);
-  return {laps.data(), laps.data() + laps.span()};
+  std::vector<double> state;
+  if (laps_.data()) {
+    const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), laps_);
+    state.assign(laps.data(), laps.data() + laps.span());
+  }
+  const auto force = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), membranes_->views().force);
+  for (int v = 0; v < membranes_->vertices(); ++v)
+    for (int m = 0; m < 3; ++m) state.push_back(force(v, m));
+  return state;
 }
 
 void ForceCoupling::set_state(const std::vector<double>& state) {
-  if (!laps_.data()) return;
-  const auto laps = Kokkos::create_mirror_view(laps_);
-  for (std::size_t i = 0; i < laps.span(); ++i) laps.data()[i] = static_cast<int>(state.at(i));
-  Kokkos::deep_copy(laps_, laps);
+  auto at = state.begin();
+  if (laps_.data()) {
+    const auto laps = Kokkos::create_mirror_view(laps_);
+    for (std::size_t i = 0; i < laps.span(); ++i) laps.data()[i] = static_cast<int>(*at++);
+    Kokkos::deep_copy(laps_, laps);
+  }
+  const auto force = Kokkos::create_mirror_view(membranes_->views().force);
+  for (int v = 0; v < membranes_->vertices(); ++v)
+    for (int m = 0; m < 3; ++m) force(v, m) = *at++;
+  Kokkos::deep_copy(membranes_->views().force, force);
 }
 
 }  // namespace corpuscle

@@ -3,6 +3,7 @@
 
 #include "coupling/coupling.hpp"
 #include "immersed/wrap.hpp"
+#include "transfer/cytosol.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -26,7 +27,7 @@ class ForceCoupling : public Coupling {
   double power_on_cells() override;
   double unresolved_dissipation() override;
 
-  /// Periods taken off each cell since the start.
+  /// Periods taken off each cell since the start, and the force on the fluid in the last step.
   std::vector<double> state() const override;
   void set_state(const std::vector<double>& state) override;
   std::vector<Triple> wrapped_by() const override;
@@ -35,10 +36,14 @@ class ForceCoupling : public Coupling {
 
  private:
   void place(double time_us);
+  void fill_cells(double time_us);
   void wrap();
   void collect();
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
+  double resisting_share() const;
+  void find_softest();
+  double anticipated_reaction(double dt) const;
   SlipViews slip_of_membranes() const;
   std::string vertex_text(int vertex) const;
   void measure_stability();
@@ -49,6 +54,7 @@ class ForceCoupling : public Coupling {
   std::vector<double> lengths_us_;  // of all steps there will be
   std::unique_ptr<Membranes> membranes_;
   std::unique_ptr<Transfer> transfer_;
+  std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
   Components<double> traction_;                 // [vertex, 3] kPa
   Array<double> slip_share_;                    // [vertex] empty: 1
   HostCopy<Components<double>> velocity_host_;  // only on several ranks
@@ -56,6 +62,10 @@ class ForceCoupling : public Coupling {
   double quiet_speed_;        // um/us: what counts as rest
   Table<int> laps_;           // [cell, 3] only in periodic domains
   std::string coarse_;        // which cells the grid resolves coarsely
+  /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.
+  struct Softest {
+    double area = 0, radius = 0, wave_number_square = 0;
+  } softest_;
   double stable_us_ = 0;      // largest stable step at the start
   double outflow_limit_ = 0;  // um
   NearSide outflow_;          // at the last place()

@@ -32,7 +32,28 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   }
 }
 
+void MembraneViscosity::remember_force(const MembraneViews& m) {
+  if (!last_force_.data()) last_force_ = Components<double>(uninitialised("corpuscle::membrane::last_force_vertex"), m.vertices, 3);
+  Kokkos::deep_copy(Exec(), last_force_, m.force);
+}
+
+template <class Damping>
+void MembraneViscosity::resist_with(const MembraneViews& m, double beta) const {
+  constexpr double massless = 1e300;  // us: mass over it
+  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, last_force_}, massless);
+  solve_viscous<Damping>(m, views_, views_.right_side, m.surface.v);
+  subtract_damping<Damping>(m, views_.along, m.surface.v, last_force_);
+}
+
+void MembraneViscosity::resist(const MembraneViews& m, double beta) const {
+  if (tangential_)
+    resist_with<FullDamping>(m, beta);
+  else
+    resist_with<CentralDamping>(m, beta);
+}
+
 double MembraneViscosity::dissipation(const MembraneViews& m) const {
+  if (last_force_.data()) return damping_power(m, last_force_);  // they move as the fluid does, not quite as D was told
   return tangential_ ? viscous_power<FullDamping>(m) : viscous_power<CentralDamping>(m);
 }
 

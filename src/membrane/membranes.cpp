@@ -113,6 +113,17 @@ void Membranes::compute_forces() {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
+void Membranes::remember_forces() {
+  if (viscosity_) viscosity_->remember_force(views_);
+}
+
+void Membranes::resist(double beta) {
+  if (!viscosity_) return;
+  Kokkos::deep_copy(views_.status, 0);
+  viscosity_->resist(views_, beta);
+  if (const int cell = trouble(); cell >= 0) explain(cell, 0);
+}
+
 template <class Load>
 void Membranes::take_substeps(int count, double dt, const Load& load) {
   for (int s = 0; s < count; ++s) {

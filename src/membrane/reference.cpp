@@ -154,7 +154,13 @@ CellReference make_reference(const CellSettings& cell) {
 }
 
 TriangleMesh placed_mesh(const CellReference& reference, const CellSettings& cell) {
-  return transform(reference.mesh, cell.axis, cell.spin_deg, cell.center_um);
+  TriangleMesh mesh = reference.mesh;
+  const Triple& s = cell.start_stretch;
+  const double whole = std::cbrt(s[0] * s[1] * s[2]);  // of the volume, which is kept
+  if (s != Triple{1, 1, 1})
+    for (Triple& p : mesh.vertices)
+      for (int d = 0; d < 3; ++d) p[d] *= s[d] / whole;
+  return transform(mesh, cell.axis, cell.spin_deg, cell.center_um);
 }
 
 bool same_type(const CellSettings& a, const CellSettings& b) { return type_key(a) == type_key(b); }

@@ -36,6 +36,8 @@ class Transfer {
   int markers() const { return markers_.count; }
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
+  const MarkerSearch& search() const { return search_; }
+  const VertexPlaces& places() const { return places_; }
 
  private:
   void make_room(int markers);
