@@ -1,9 +1,10 @@
 // A capsule in shear, beside boundary integrals and small deformations; perf/capsule.py runs the tables.
 //   capsule LAW CAPILLARY RATIO A_OVER_H BOX VERTICES SLIP STEP UNTIL    prints t,D,angle
 // LAW is neo-hookean or skalak; BOX in radii; SLIP 0 or 1; STEP and UNTIL in units of the inverse shear rate.
+#include "capsule.hpp"
+
 #include <cstring>
 
-#include "capsule.hpp"
 #include "program.hpp"
 
 using namespace corpuscle;

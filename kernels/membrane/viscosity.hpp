@@ -69,10 +69,10 @@ KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const Table<double>&
 }
 
 /// The fluid around membranes that move with it: it moved with U under the force that it had last, and takes beta more for each
-/// area and each velocity beyond U. All other forces on the membrane are m.force.
+/// area and each velocity beyond U. `force`: all others on the membrane.
 struct FluidReaction {
   double beta;  // mPa s/um
-  Components<double> velocity, last_force;  // [vertex, 3] U, um/us; nN
+  Components<double> velocity, last_force, force;  // [vertex, 3] U, um/us; nN
 };
 
 /// What drives vertex i, from inside the membrane and outside, nN.
@@ -80,8 +80,8 @@ template <class Load>
 KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const Load& outside, int i, double area) {
   return gather_force(m, i) + outside.force(m, i, area);
 }
-KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const FluidReaction& fluid, int i, double area) {
-  return (fluid.beta * area) * load(fluid.velocity, i) + load(m.force, i) - load(fluid.last_force, i);
+KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReaction& fluid, int i, double area) {
+  return (fluid.beta * area) * load(fluid.velocity, i) + load(fluid.force, i) - load(fluid.last_force, i);
 }
 
 /// Right-hand side, diagonal, preconditioner and volume gradient at the current positions.
@@ -224,16 +224,18 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
-/// m.force -= D v, which is kept in `damping`.
+/// damping = D v, which is taken off m.force and, if it is another array, off `force`.
 template <class Damping>
 void subtract_damping(const MembraneViews& m, const Table<double>& along, const Components<double>& v,
-                      const Components<double>& damping) {
+                      const Components<double>& force, const Components<double>& damping) {
+  const bool two = force.data() != m.force.data();
   Kokkos::parallel_for(
       "corpuscle::membrane::subtract_damping", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
         const Vec3 taken = damping_at<Damping>(m.surface, along, law, v, i);
         store(damping, i, taken);
         store(m.force, i, load(m.force, i) - taken);
+        if (two) store(force, i, load(force, i) - taken);
       });
 }
 

@@ -1,6 +1,7 @@
-// How much of each grid cell is inside membranes: signed crossings of the grid's index lines with triangles, counted in integers,
-// so that neither the order of the sums nor rounding in the geometry matters. In index space triangles are flat and vertices are
-// rounded to a fine lattice: whether a line meets a triangle is then decided exactly, and a closed surface never leaks.
+// How much of each grid cell is inside membranes: signed crossings of the grid's index lines with triangles, counted in
+// integers, so that neither the order of the sums nor rounding in the geometry matters. In index space triangles are
+// flat and vertices are rounded to a fine lattice: whether a line meets a triangle is then decided exactly, and a
+// closed surface never leaks.
 #pragma once
 
 #include "transfer/find_markers.hpp"
@@ -11,21 +12,24 @@ namespace corpuscle {
 constexpr int inside_bits = 20;
 constexpr std::int64_t inside_unit = std::int64_t(1) << inside_bits;
 
-/// For each direction, over the cells of the block in units: first what the crossings of the line through a cell change there,
-/// then what they add up to, the part of the cell that is inside. The last halo cell below a line holds where it starts from.
+/// For each direction, over the cells of the block in units: first what the crossings of the line through a cell change
+/// there, then what they add up to, the part of the cell that is inside. The last halo cell below a line holds where it
+/// starts from.
 struct InsideViews {
   Array<int> part[3];  // [cell]
 };
 
 /// Triangles whose interior is `material`, by the cell they are of.
 struct InsideSurface {
-  Table<int> triangle;      // [triangle, 3] vertex numbers
+  Table<int> triangle;       // [triangle, 3] vertex numbers
   Array<int> triangle_body;  // [triangle]
-  Array<int> material;      // [body]
+  Array<int> material;       // [body]
 };
 
-/// Where a vertex is in index space, in units, as if it had not been shifted by periods. @returns false if it was not found
-KOKKOS_INLINE_FUNCTION bool unshifted_place(const MarkerSearch& s, const VertexPlaces& places, int v, std::int64_t (&at)[3]) {
+/// Where a vertex is in index space, in units, as if it had not been shifted by periods. @returns false if it was not
+/// found
+KOKKOS_INLINE_FUNCTION bool unshifted_place(const MarkerSearch& s, const VertexPlaces& places, int v,
+                                            std::int64_t (&at)[3]) {
   const int image = places.image(v);
   if (image < 0) return false;
   const double xi[3] = {places.xi(v, 0), places.xi(v, 1), places.xi(v, 2)};
@@ -39,8 +43,9 @@ KOKKOS_INLINE_FUNCTION bool unshifted_place(const MarkerSearch& s, const VertexP
   return true;
 }
 
-/// Which side of the line from a to b the origin is on, in a plane: +1 left, -1 right. A tie goes as for an origin moved by a
-/// little along the first axis and by much less along the second, so that both triangles of an edge agree; 0 only if a = b.
+/// Which side of the line from a to b the origin is on, in a plane: +1 left, -1 right. A tie goes as for an origin
+/// moved by a little along the first axis and by much less along the second, so that both triangles of an edge agree; 0
+/// only if a = b.
 KOKKOS_INLINE_FUNCTION int side_of_edge(const std::int64_t (&a)[2], const std::int64_t (&b)[2]) {
   const std::int64_t area = a[0] * b[1] - a[1] * b[0], up = a[1] - b[1], along = b[0] - a[0];
   const std::int64_t decides = area != 0 ? area : (up != 0 ? up : along);
@@ -49,7 +54,8 @@ KOKKOS_INLINE_FUNCTION int side_of_edge(const std::int64_t (&a)[2], const std::i
 
 /// Where the line along d that passes through zero of the other two coordinates meets a triangle, in units along d.
 /// @returns +1 if the line enters the surface there, -1 if it leaves, 0 if they do not meet
-KOKKOS_INLINE_FUNCTION int cross_triangle(const std::int64_t (&corner)[3][2], const std::int64_t (&along)[3], std::int64_t& at) {
+KOKKOS_INLINE_FUNCTION int cross_triangle(const std::int64_t (&corner)[3][2], const std::int64_t (&along)[3],
+                                          std::int64_t& at) {
   int turn = 0;
   std::int64_t weight[3], total = 0;
   for (int k = 0; k < 3; ++k) {
@@ -109,22 +115,24 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
       const int c = index.cell(where[0], where[1], where[2]), s = index.stride(d);
       Kokkos::atomic_add(&part(c), sign * (static_cast<int>(inside_unit) - within));
       Kokkos::atomic_add(&part(c + s), sign * within);
-      if (turns != 0) Kokkos::atomic_add(&part(c - (static_cast<int>(cell) + 1) * s), sign * turns * static_cast<int>(inside_unit));
+      if (turns != 0)
+        Kokkos::atomic_add(&part(c - (static_cast<int>(cell) + 1) * s), sign * turns * static_cast<int>(inside_unit));
     }
 }
 
-/// Fills `inside` with the changes along each line. A line that comes in through a periodic side is inside as often as, over
-/// all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface whose earlier
-/// crossings are at the other end. Any sum of integers is the same in any order.
-inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface, int material,
-                            const InsideViews& inside) {
+/// Fills `inside` with the changes along each line. A line that comes in through a periodic side is inside as often as,
+/// over all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface
+/// whose earlier crossings are at the other end. Any sum of integers is the same in any order.
+inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface,
+                            int material, const InsideViews& inside) {
   for (const auto& part : inside.part) Kokkos::deep_copy(Exec(), part, 0);
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
   const InsideSurface of = surface;
   const InsideViews out = inside;
   Kokkos::parallel_for(
-      "corpuscle::transfer::inside_crossings", Policy(0, static_cast<int>(surface.triangle_body.extent(0))), KOKKOS_LAMBDA(int t) {
+      "corpuscle::transfer::inside_crossings", Policy(0, static_cast<int>(surface.triangle_body.extent(0))),
+      KOKKOS_LAMBDA(int t) {
         if (of.material(of.triangle_body(t)) != material) return;
         std::int64_t corner[3][3];
         for (int k = 0; k < 3; ++k)
@@ -134,7 +142,8 @@ inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vert
         int first[3], last[3];
         for (int d = 0; d < 3; ++d) {
           std::int64_t low = corner[0][d], high = low;
-          for (int k = 1; k < 3; ++k) low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
+          for (int k = 1; k < 3; ++k)
+            low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
           const int most = index.periodic[d] ? 1 : 0;
           first[d] = most + 1, last[d] = -most - 1;
           for (int turns = -most; turns <= most; ++turns) {
@@ -183,9 +192,10 @@ inline void set_line_starts(const IndexSpace& index, int d, const Array<int>& en
       KOKKOS_LAMBDA(int line) { part(line_start(index, d, line)) = ends(line); });
 }
 
-/// From changes to what is inside, along every line. Where no other rank has a part of the lines, all changes of a line add up to
-/// nothing, or it has met a surface that is not closed: broken(0) = 1.
-inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Array<int>& part, const Array<int>& broken) {
+/// From changes to what is inside, along every line. Where no other rank has a part of the lines, all changes of a line
+/// add up to nothing, or it has met a surface that is not closed: broken(0) = 1.
+inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Array<int>& part,
+                          const Array<int>& broken) {
   const int n = index.n[d], s = index.stride(d);
   Kokkos::parallel_for(
       "corpuscle::transfer::inside", Policy(0, count_lines(index, d)), KOKKOS_LAMBDA(int line) {
@@ -200,17 +210,19 @@ inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Arra
       });
 }
 
-/// relative [cell] += (ratio - 1) times the part of each cell that is inside, the mean of the three directions'; `first`: from 1.
+/// relative [cell] += (ratio - 1) times the part of each cell that is inside, the mean of the three directions';
+/// `first`: from 1.
 inline void add_relative_viscosity(const IndexSpace& index, const InsideViews& inside, double ratio, bool first,
                                    const Array<double>& relative) {
   const double whole = 3.0 * inside_unit;
   const auto p0 = inside.part[0], p1 = inside.part[1], p2 = inside.part[2];
-  for_owned("corpuscle::transfer::inside_viscosity", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const double sum = static_cast<double>(p0(c)) + p1(c) + p2(c);
-    const double share = sum < 0 ? 0 : (sum > whole ? 1 : sum / whole);  // where surfaces overlap
-    relative(c) = (first ? 1.0 : relative(c)) + (ratio - 1) * share;
-  });
+  for_owned(
+      "corpuscle::transfer::inside_viscosity", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        const double sum = static_cast<double>(p0(c)) + p1(c) + p2(c);
+        const double share = sum < 0 ? 0 : (sum > whole ? 1 : sum / whole);  // where surfaces overlap
+        relative(c) = (first ? 1.0 : relative(c)) + (ratio - 1) * share;
+      });
 }
 
 }  // namespace corpuscle

@@ -247,16 +247,19 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     const auto scope = timers_.scope("membrane");
     wrap();
     membranes_->set_out(second_order(dt) ? dt : 0);
-    membranes_->remember_forces();
+    membranes_->remember_forces(forces());
     membranes_->compute_forces();
-    membranes_->resist(anticipated_reaction(dt));
     update_surface_geometry(set);
   }
   {
     const auto scope = timers_.scope("transfer");
     place(time);
     fill_cells(time);
-    transfer_->spread(membranes_->views().force);
+    {
+      const auto membrane = timers_.scope("membrane");
+      membranes_->resist(anticipated_reaction(dt), forces());
+    }
+    transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
   {
@@ -274,7 +277,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
 }
 
 SlipViews ForceCoupling::slip_of_membranes() const {
-  return transfer_->slip(surfaces(), membranes_->views().force, fluid_.viscosity(), slip_share_);
+  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), slip_share_);
 }
 
 double ForceCoupling::unresolved_dissipation() {
@@ -283,7 +286,7 @@ double ForceCoupling::unresolved_dissipation() {
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
-  force_per_area(membranes_->vertices(), membranes_->views().force, surfaces().area, -1, traction_);
+  force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);
   return traction_;
 }
 
@@ -305,7 +308,7 @@ std::vector<double> ForceCoupling::state() const {
     const auto laps = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), laps_);
     state.assign(laps.data(), laps.data() + laps.span());
   }
-  const auto force = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), membranes_->views().force);
+  const auto force = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), forces());
   for (int v = 0; v < membranes_->vertices(); ++v)
     for (int m = 0; m < 3; ++m) state.push_back(force(v, m));
   return state;
@@ -318,10 +321,10 @@ void ForceCoupling::set_state(const std::vector<double>& state) {
     for (std::size_t i = 0; i < laps.span(); ++i) laps.data()[i] = static_cast<int>(*at++);
     Kokkos::deep_copy(laps_, laps);
   }
-  const auto force = Kokkos::create_mirror_view(membranes_->views().force);
+  const auto force = Kokkos::create_mirror_view(forces());
   for (int v = 0; v < membranes_->vertices(); ++v)
     for (int m = 0; m < 3; ++m) force(v, m) = *at++;
-  Kokkos::deep_copy(membranes_->views().force, force);
+  Kokkos::deep_copy(forces(), force);
 }
 
 }  // namespace corpuscle

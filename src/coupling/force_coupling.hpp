@@ -44,6 +44,8 @@ class ForceCoupling : public Coupling {
   double resisting_share() const;
   void find_softest();
   double anticipated_reaction(double dt) const;
+  /// On the fluid, in the last step.
+  const Components<double>& forces() const { return membranes_->views().force; }
   SlipViews slip_of_membranes() const;
   std::string vertex_text(int vertex) const;
   void measure_stability();

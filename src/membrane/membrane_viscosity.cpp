@@ -32,24 +32,24 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   }
 }
 
-void MembraneViscosity::remember_force(const MembraneViews& m) {
+void MembraneViscosity::remember_forces(const MembraneViews& m, const Components<double>& force) {
   if (!last_force_.data()) last_force_ = Components<double>(uninitialised("corpuscle::membrane::last_force_vertex"), m.vertices, 3);
-  Kokkos::deep_copy(Exec(), last_force_, m.force);
+  Kokkos::deep_copy(Exec(), last_force_, force);
 }
 
 template <class Damping>
-void MembraneViscosity::resist_with(const MembraneViews& m, double beta) const {
+void MembraneViscosity::resist_with(const MembraneViews& m, double beta, const Components<double>& force) const {
   constexpr double massless = 1e300;  // us: mass over it
-  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, last_force_}, massless);
+  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, last_force_, force}, massless);
   solve_viscous<Damping>(m, views_, views_.right_side, m.surface.v);
-  subtract_damping<Damping>(m, views_.along, m.surface.v, last_force_);
+  subtract_damping<Damping>(m, views_.along, m.surface.v, force, last_force_);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, double beta) const {
+void MembraneViscosity::resist(const MembraneViews& m, double beta, const Components<double>& force) const {
   if (tangential_)
-    resist_with<FullDamping>(m, beta);
+    resist_with<FullDamping>(m, beta, force);
   else
-    resist_with<CentralDamping>(m, beta);
+    resist_with<CentralDamping>(m, beta, force);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

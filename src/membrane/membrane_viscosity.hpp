@@ -20,9 +20,9 @@ class MembraneViscosity {
   }
 
   /// See Membranes::remember_forces() and Membranes::resist(): solves (beta A + D) v = beta A U + F - F_last for m.surface.v, which
-  /// holds U, and takes D v off F, which is m.force. The triangle geometry must be current.
-  void remember_force(const MembraneViews& m);
-  void resist(const MembraneViews& m, double beta) const;
+  /// holds U, and takes D v off the forces F. The triangle geometry must be current.
+  void remember_forces(const MembraneViews& m, const Components<double>& force);
+  void resist(const MembraneViews& m, double beta, const Components<double>& force) const;
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -36,7 +36,7 @@ class MembraneViscosity {
 
  private:
   template <class Damping>
-  void resist_with(const MembraneViews& m, double beta) const;
+  void resist_with(const MembraneViews& m, double beta, const Components<double>& force) const;
 
   bool tangential_;
   Components<double> last_force_;  // [vertex, 3] nN, only for membranes that move with the fluid; after resist() what it took off

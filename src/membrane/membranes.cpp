@@ -113,14 +113,14 @@ void Membranes::compute_forces() {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
-void Membranes::remember_forces() {
-  if (viscosity_) viscosity_->remember_force(views_);
+void Membranes::remember_forces(const Components<double>& force) {
+  if (viscosity_) viscosity_->remember_forces(views_, force);
 }
 
-void Membranes::resist(double beta) {
+void Membranes::resist(double beta, const Components<double>& force) {
   if (!viscosity_) return;
   Kokkos::deep_copy(views_.status, 0);
-  viscosity_->resist(views_, beta);
+  viscosity_->resist(views_, beta, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 

@@ -60,14 +60,14 @@ class Membranes {
   /// Internal forces at the present positions into views().force [vertex, 3] nN.
   /// @throws ComputationError  if a triangle is strained beyond the limit of its law
   void compute_forces();
-  /// Of membranes that move with a fluid, viscous ones alone: before their forces are computed anew, keep views().force, which the
-  /// fluid had in its last step, when it moved them with surfaces().v.
-  void remember_forces();
-  /// After it, once views().force holds all other forces at the present positions: take off what membrane viscosity resists, as the
-  /// fluid will move them. surfaces().v becomes an estimate of that velocity.
+  /// Of membranes that move with a fluid, viscous ones alone: before the forces on the fluid are worked out anew, keep those,
+  /// [vertex, 3] nN, that it had in its last step, when it moved them with surfaces().v.
+  void remember_forces(const Components<double>& force);
+  /// After it, once `force` holds all others (views().force, or that and what else acts): take what membrane viscosity resists, as
+  /// the fluid will move them, off `force` and views().force. surfaces().v becomes an estimate of that velocity.
   /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
   ///              deformations; twice that is too much
-  void resist(double beta);
+  void resist(double beta, const Components<double>& force);
 
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
   int substeps(double dt_us, double beta) const;

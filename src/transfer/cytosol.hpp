@@ -23,8 +23,8 @@ class Cytosol {
   const Array<double>& relative_viscosity() const { return relative_; }
   /// No value of it is below.
   double least() const { return least_; }
-  /// Whether, at the last update, a grid line left a surface more often than it came in (all ranks call): a mesh with triangles
-  /// too large for this grid.
+  /// Whether, at the last update, a grid line left a surface more often than it came in (all ranks call): a mesh with
+  /// triangles too large for this grid.
   bool broken() const;
 
  private:
@@ -33,7 +33,7 @@ class Cytosol {
   Grid* grid_;
   std::vector<double> ratios_;  // those there are but 1
   double least_ = 1;
-  Array<int> material_;         // [cell] into ratios_; -1 for 1
+  Array<int> material_;  // [cell] into ratios_; -1 for 1
   InsideViews inside_;
   Array<double> relative_;
   std::vector<std::unique_ptr<RankRow>> row_;  // [direction]

@@ -9,7 +9,7 @@ namespace corpuscle::scenes {
 /// Lengths in radii, times over the shear rate.
 struct ShearedCapsule {
   CellSettings::Law law = CellSettings::Law::neo_hookean;
-  double capillary = 0.3;       // outer viscosity x shear rate x radius / shear modulus
+  double capillary = 0.3;  // outer viscosity x shear rate x radius / shear modulus
   double viscosity_ratio = 1;
   double cells_per_radius = 5;  // of the grid
   double box = 8;               // walls and images from each other

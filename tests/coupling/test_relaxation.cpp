@@ -45,7 +45,8 @@ std::vector<double> lengths(const Case& scene) {
 
 }  // namespace
 
-TEST_CASE("a stretched cell of measured membrane viscosity goes back as slowly with long steps as with short ones", "[coupling][force]") {
+TEST_CASE("a stretched cell of measured membrane viscosity goes back as slowly with long steps as with short ones",
+          "[coupling][force]") {
   const double end = 2000, rest = lengths(stretched_cell(100, 100, 0)).front() / 1.08;
   std::vector<double> rate, lost;
   double reference = 0;
@@ -56,8 +57,8 @@ TEST_CASE("a stretched cell of measured membrane viscosity goes back as slowly w
     lost.push_back((length[10] - reference) / (rate[0] * (reference - rest)) / step);
   }
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("time constants {:.4f} {:.4f} {:.4f} s; {:.1f} and {:.1f} steps behind", 1e-6 / rate[0], 1e-6 / rate[1], 1e-6 / rate[2],
-                     lost[1], lost[2]));
+    WARN(fmt::format("time constants {:.4f} {:.4f} {:.4f} s; {:.1f} and {:.1f} steps behind", 1e-6 / rate[0],
+                     1e-6 / rate[1], 1e-6 / rate[2], lost[1], lost[2]));
   CHECK(rate[0] > 0);
   CHECK(rate[1] == Approx(rate[0]).epsilon(0.01));
   CHECK(rate[2] == Approx(rate[0]).epsilon(0.01));

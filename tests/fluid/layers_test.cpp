@@ -10,15 +10,16 @@ using namespace corpuscle::fluid_test;
 
 namespace {
 
-/// A layer of `ratio` times the viscosity below y = 1 + offset spacings, in a channel of height 2, spacing h, along x. Steady flow
-/// under a plate that moves (Couette) or a gradient (Poiseuille): the largest error over the largest speed, and the same of the
-/// work that the energy balance has.
+/// A layer of `ratio` times the viscosity below y = 1 + offset spacings, in a channel of height 2, spacing h, along x.
+/// Steady flow under a plate that moves (Couette) or a gradient (Poiseuille): the largest error over the largest speed,
+/// and the same of the work that the energy balance has.
 struct Errors {
   double velocity = 0, dissipation = 0;
 };
 
 Errors two_layers(int n, double ratio, double offset, bool couette) {
-  auto walls = sides({Type::periodic, Type::periodic, Type::wall, couette ? Type::moving_wall : Type::wall, Type::periodic, Type::periodic});
+  auto walls = sides({Type::periodic, Type::periodic, Type::wall, couette ? Type::moving_wall : Type::wall,
+                      Type::periodic, Type::periodic});
   if (couette) walls[3].velocity = Triple{1, 0, 0};
   FluidSettings settings;
   settings.density_pg_per_um3 = settings.kinematic_viscosity_um2_per_us = 1;
@@ -76,10 +77,10 @@ TEST_CASE("two layers of fluid flow as they should, and lose what drives them", 
     fine = {std::max(fine.velocity, b.velocity), std::max(fine.dissipation, b.dissipation)};
   }
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("{} {}: velocity {:.4f}, {:.4f}; energy {:.1e}, {:.1e}", couette ? "Couette" : "Poiseuille", ratio, coarse.velocity,
-                     fine.velocity, coarse.dissipation, fine.dissipation));
+    WARN(fmt::format("{} {}: velocity {:.4f}, {:.4f}; energy {:.1e}, {:.1e}", couette ? "Couette" : "Poiseuille", ratio,
+                     coarse.velocity, fine.velocity, coarse.dissipation, fine.dissipation));
   // The interface is smeared over a spacing: of first order.
   CHECK(fine.velocity < 0.03);
   CHECK(fine.velocity < 0.75 * coarse.velocity);  // the largest of several places between nodes
-  CHECK(fine.dissipation < 1e-6);  // the solver's tolerance
+  CHECK(fine.dissipation < 1e-6);                 // the solver's tolerance
 }
