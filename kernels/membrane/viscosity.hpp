@@ -224,6 +224,18 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
+/// v without any change of volume, after predict_viscous_velocity(). A fluid that cannot be compressed answers to a pressure inside
+/// with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
+inline void keep_volume(const MembraneViews& m, const MotionViews& motion) {
+  const auto v = m.surface.v;
+  for_sections(
+      "corpuscle::membrane::keep_volume", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const double factor = -section_total(motion.sums, cell, 0) / section_total(motion.sums, cell, 1);
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
+                             [&](int i) { store(v, i, load(v, i) + factor * load(motion.direction, i)); });
+      });
+}
+
 /// damping = D v, which is taken off m.force and, if it is another array, off `force`.
 template <class Damping>
 void subtract_damping(const MembraneViews& m, const Table<double>& along, const Components<double>& v,

@@ -38,18 +38,20 @@ void MembraneViscosity::remember_forces(const MembraneViews& m, const Components
 }
 
 template <class Damping>
-void MembraneViscosity::resist_with(const MembraneViews& m, double beta, const Components<double>& force) const {
+void MembraneViscosity::resist_with(const MembraneViews& m, const MotionViews& motion, double beta,
+                                    const Components<double>& force) const {
   constexpr double massless = 1e300;  // us: mass over it
-  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, last_force_, force}, massless);
-  solve_viscous<Damping>(m, views_, views_.right_side, m.surface.v);
+  predict_viscous_velocity<Damping>(m, motion, views_, FluidReaction{beta, m.surface.v, last_force_, force}, massless);
+  keep_volume(m, motion);
   subtract_damping<Damping>(m, views_.along, m.surface.v, force, last_force_);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, double beta, const Components<double>& force) const {
+void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& motion, double beta,
+                               const Components<double>& force) const {
   if (tangential_)
-    resist_with<FullDamping>(m, beta, force);
+    resist_with<FullDamping>(m, motion, beta, force);
   else
-    resist_with<CentralDamping>(m, beta, force);
+    resist_with<CentralDamping>(m, motion, beta, force);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

@@ -19,10 +19,11 @@ class MembraneViscosity {
     }
   }
 
-  /// See Membranes::remember_forces() and Membranes::resist(): solves (beta A + D) v = beta A U + F - F_last for m.surface.v, which
-  /// holds U, and takes D v off the forces F. The triangle geometry must be current.
+  /// See Membranes::remember_forces() and Membranes::resist(): solves (beta A + D) v = beta A U + F - F_last + q dV/dx for
+  /// m.surface.v, which holds U, with the pressure q inside that keeps the volume, and takes D v off the forces F. The triangle
+  /// geometry must be current; motion.direction is where the solver of q starts from.
   void remember_forces(const MembraneViews& m, const Components<double>& force);
-  void resist(const MembraneViews& m, double beta, const Components<double>& force) const;
+  void resist(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -36,7 +37,7 @@ class MembraneViscosity {
 
  private:
   template <class Damping>
-  void resist_with(const MembraneViews& m, double beta, const Components<double>& force) const;
+  void resist_with(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   bool tangential_;
   Components<double> last_force_;  // [vertex, 3] nN, only for membranes that move with the fluid; after resist() what it took off

@@ -120,7 +120,8 @@ void Membranes::remember_forces(const Components<double>& force) {
 void Membranes::resist(double beta, const Components<double>& force) {
   if (!viscosity_) return;
   Kokkos::deep_copy(views_.status, 0);
-  viscosity_->resist(views_, beta, force);
+  Kokkos::deep_copy(motion_.direction, 0.0);  // so that a step depends on the state alone
+  viscosity_->resist(views_, motion_, beta, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
