@@ -210,18 +210,27 @@ inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Arra
       });
 }
 
-/// relative [cell] += (ratio - 1) times the part of each cell that is inside, the mean of the three directions';
-/// `first`: from 1.
-inline void add_relative_viscosity(const IndexSpace& index, const InsideViews& inside, double ratio, bool first,
-                                   const Array<double>& relative) {
+/// Means over each cell of the viscosity over that outside, and of its inverse.
+struct CytosolViews {
+  Array<double> relative, fluidity;  // [cell]
+};
+
+/// Adds what a fluid of `ratio` does to them by the part of each cell that is inside, the mean of the three directions';
+/// `first`: from 1. @param least  what no viscosity is below, where surfaces overlap too
+inline void add_relative_viscosity(const IndexSpace& index, const InsideViews& inside, double ratio, bool first, double least,
+                                   const CytosolViews& cytosol) {
   const double whole = 3.0 * inside_unit;
   const auto p0 = inside.part[0], p1 = inside.part[1], p2 = inside.part[2];
+  const CytosolViews out = cytosol;
   for_owned(
       "corpuscle::transfer::inside_viscosity", index, KOKKOS_LAMBDA(int i, int j, int k) {
         const int c = index.cell(i, j, k);
         const double sum = static_cast<double>(p0(c)) + p1(c) + p2(c);
         const double share = sum < 0 ? 0 : (sum > whole ? 1 : sum / whole);  // where surfaces overlap
-        relative(c) = (first ? 1.0 : relative(c)) + (ratio - 1) * share;
+        const double relative = (first ? 1.0 : out.relative(c)) + (ratio - 1) * share;
+        const double fluidity = (first ? 1.0 : out.fluidity(c)) + (1 / ratio - 1) * share;
+        out.relative(c) = relative > least ? relative : least;
+        out.fluidity(c) = fluidity * out.relative(c) > 1 ? fluidity : 1 / out.relative(c);
       });
 }
 

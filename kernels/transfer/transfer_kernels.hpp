@@ -51,7 +51,7 @@ void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& mar
         for (int d = 0; d < 3; ++d) {
           Vec3 sum;
           visit_faces<Delta>(block, eta, d,
-                             [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.area[d], c); });
+                             [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.sharp_area[d], c); });
           seen[d] = sum;
         }
         // Columns of the inverse of the matrix with rows seen[d].
@@ -210,7 +210,7 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
               const bool beyond = end[0] >= 0 || end[1] >= 0 || end[2] >= 0;
               if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2]))
                 return;
-              sum += w * given_flux(block, u, d, row, end, load(block.area[d], c));
+              sum += w * given_flux(block, u, d, row, end, load(block.sharp_area[d], c));
             });
           velocity += sum * inverse_column(m, marker, d);
         }

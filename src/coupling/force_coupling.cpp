@@ -43,7 +43,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
     std::vector<double> ratios;
     for (const auto& cell : scene.cells) ratios.push_back(cell.viscosity_ratio);
     cytosol_ = std::make_unique<Cytosol>(fluid.grid(), ratios);
-    fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least());
+    fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least(), cytosol_->fluidity());
   }
   fluid.raise_reference_speed(quiet_speed_);
   traction_ = Components<double>("corpuscle::coupling::traction", vertices, 3);

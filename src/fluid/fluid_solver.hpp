@@ -78,8 +78,10 @@ class FluidSolver {
 
   /// A viscosity that varies in space: `relative` [cell] is its ratio to viscosity(), with valid halos and, at boundary nodes,
   /// the boundary's. Shared: what is written into it counts from the next solve. Without this call there is one viscosity.
-  /// @param least  not above any value that it will have, nor above 1
-  void set_viscosity(const Array<double>& relative, double least = 1) {
+  /// @param least     not above any value that it will have, nor above 1
+  /// @param fluidity  [cell] where cells hold two fluids, the mean of the inverse of what `relative` is the mean of; shared
+  void set_viscosity(const Array<double>& relative, double least = 1, const Array<double>& fluidity = {}) {
+    fluidity_ = fluidity;
     relative_viscosity_ = relative;
     least_viscosity_ = least;
   }
@@ -90,7 +92,8 @@ class FluidSolver {
   void visit_varying_viscosity(const Use& use) const {
     const GridViews& grid = grid_->views();
     if (relative_viscosity_.data())
-      use(VaryingViscosity{relative_viscosity_, least_viscosity_, grid.x, {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
+      use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, grid.x,
+                           {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
   }
 
   /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
@@ -173,6 +176,7 @@ class FluidSolver {
   Array<NodeKind> kind_;
   PressureMask mask_;
   Array<double> relative_viscosity_;  // empty: one viscosity
+  Array<double> fluidity_;            // empty: no cell holds two fluids
   double least_viscosity_ = 1;
   ViscousCoefficients g_;
   double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()

@@ -15,8 +15,10 @@ Cytosol::Cytosol(Grid& grid, const std::vector<double>& ratio) : grid_(&grid) {
   }
   Kokkos::deep_copy(material_, material);
   for (double r : ratios_) least_ = std::min(least_, r);
-  relative_ = Array<double>(uninitialised("corpuscle::transfer::inside_relative_viscosity"), index.size());
-  Kokkos::deep_copy(relative_, 1.0);
+  viscosity_ = {Array<double>(uninitialised("corpuscle::transfer::inside_relative_viscosity"), index.size()),
+                Array<double>(uninitialised("corpuscle::transfer::inside_fluidity"), index.size())};
+  Kokkos::deep_copy(viscosity_.relative, 1.0);
+  Kokkos::deep_copy(viscosity_.fluidity, 1.0);
   broken_ = Array<int>("corpuscle::transfer::inside_broken", 1);
   broken_host_ = HostCopy(broken_);
   int lines = 0;
@@ -53,9 +55,10 @@ void Cytosol::update(const Transfer& transfer, const SurfaceSet& surfaces) {
       join_rows(d);
       add_up_inside(index, d, row_[d]->size() == 1, inside_.part[d], broken_);
     }
-    add_relative_viscosity(index, inside_, ratios_[m], m == 0, relative_);
+    add_relative_viscosity(index, inside_, ratios_[m], m == 0, least_, viscosity_);
   }
-  grid_->halo().exchange(relative_);
+  grid_->halo().exchange(viscosity_.relative);
+  grid_->halo().exchange(viscosity_.fluidity);
 }
 
 bool Cytosol::broken() const { return grid_->comm().max(broken_host_.read()(0)) > 0; }

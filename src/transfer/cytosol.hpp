@@ -20,7 +20,9 @@ class Cytosol {
   /// The viscosity with the surfaces where the transfer has placed their vertices.
   void update(const Transfer& transfer, const SurfaceSet& surfaces);
   /// Over that outside, [cell] with valid halos, 1 on the sides: shared with the fluid.
-  const Array<double>& relative_viscosity() const { return relative_; }
+  const Array<double>& relative_viscosity() const { return viscosity_.relative; }
+  /// The mean of its inverse, [cell]: more than the inverse of that where a cell holds two fluids.
+  const Array<double>& fluidity() const { return viscosity_.fluidity; }
   /// No value of it is below.
   double least() const { return least_; }
   /// Whether, at the last update, a grid line left a surface more often than it came in (all ranks call): a mesh with
@@ -35,7 +37,7 @@ class Cytosol {
   double least_ = 1;
   Array<int> material_;  // [cell] into ratios_; -1 for 1
   InsideViews inside_;
-  Array<double> relative_;
+  CytosolViews viscosity_;
   std::vector<std::unique_ptr<RankRow>> row_;  // [direction]
   Array<int> ends_, broken_;
   HostCopy<Array<int>> ends_host_, broken_host_;

@@ -40,6 +40,7 @@ class Transfer {
   const VertexPlaces& places() const { return places_; }
 
  private:
+  void prepare_sharpening();
   void make_room(int markers);
   template <class Use>
   void with_kernel(const Use& use) const;
@@ -53,6 +54,8 @@ class Transfer {
   MarkerViews markers_;
   int room_ = 0;
   FaceForce faces_;
+  double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing
+  Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then
 };
 
 }  // namespace corpuscle

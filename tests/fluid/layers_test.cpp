@@ -30,15 +30,18 @@ Errors two_layers(int n, double ratio, double offset, bool couette) {
   FluidSolver solver(grid, settings, walls);
   const IndexSpace& index = grid.index();
   const Array<double> relative("corpuscle::test::relative", index.size());
-  const auto host = Kokkos::create_mirror_view(relative);
+  const Array<double> fluidity("corpuscle::test::fluidity", index.size());
+  const auto host = Kokkos::create_mirror_view(relative), inverse = Kokkos::create_mirror_view(fluidity);
   for (int c = 0; c < index.size(); ++c) {
     int i, j, k;
     index.unpack(c, i, j, k);
     const double below = std::clamp(face / h - j, 0.0, 1.0);
     host(c) = j < 0 ? ratio : 1 + (ratio - 1) * below;
+    inverse(c) = j < 0 ? 1 / ratio : 1 + (1 / ratio - 1) * below;
   }
   Kokkos::deep_copy(relative, host);
-  solver.set_viscosity(relative, std::min(1.0, ratio));
+  Kokkos::deep_copy(fluidity, inverse);
+  solver.set_viscosity(relative, std::min(1.0, ratio), fluidity);
   for (int step = 0; step < 40; ++step) {
     solver.begin_step(20);
     solver.solve(20 * (step + 1), nullptr);
