@@ -55,12 +55,16 @@ struct LevelOperator {
   }
 };
 
-/// The same for the cycle, and how it is coarsened: coarse cell I holds the cells from factor I + shift.
+/// The same for the cycle, and how it is coarsened: cell I of this rank's part of the coarser level holds the cells from
+/// factor I + shift.
 struct MultigridLevel : LevelOperator<CycleReal> {
   int factor[3] = {1, 1, 1};  // cells of this level in one of the next coarser, along each direction
   int shift[3] = {0, 0, 0};   // 1 where the first cell of this rank is the second of a pair
+  IndexSpace part;            // of the coarser level, what this rank makes
+  int begin[3] = {0, 0, 0};   // where the part begins in the coarser level as this rank has it: not at 0 where it has the whole
   bool split = false;         // whether somewhere the cells of a pair belong to different ranks
   bool closed[3][2] = {};     // sides whose conductance does not count in the diagonal
+  bool shared[3][2] = {};     // sides whose halo is filled by others, or from the other end of a period
 };
 
 /// Conductances between nodes that both have a pressure, on owned cells and one halo layer.
@@ -89,11 +93,11 @@ KOKKOS_INLINE_FUNCTION int children(const MultigridLevel& fine, int d, int coars
   return rest < fine.factor[d] ? rest : fine.factor[d];
 }
 
-/// Conductances of the next coarser level; those of the finer one in its first halo layer must be valid. The distance
+/// Conductances of this rank's part of the next coarser level; those of the finer one in its first halo layer must be valid. The distance
 /// between cell centres along a joined direction grows, so a conductance is divided by the mean number of cells joined
 /// on its two sides.
 inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLevel& coarse) {
-  const IndexSpace index = coarse.index, fine_index = fine.index;
+  const IndexSpace index = fine.part, fine_index = fine.index, all = coarse.index;
   for (int d = 0; d < 3; ++d) {
     const int e = (d + 1) % 3, f = (d + 2) % 3;
     const auto g = coarse.conductance[d];
@@ -114,23 +118,23 @@ inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLeve
       for (int b = 0; b < children(fine, f, at[f]); ++b)
         for (int a = 0; a < children(fine, e, at[e]); ++a)
           sum += fine.conductance[d](c + a * fine_index.stride(e) + b * fine_index.stride(f));
-      g(index.cell(i, j, k)) = sum / cells;
+      g(all.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2])) = sum / cells;
     });
   }
 }
 
-/// coarse_values = sums over the joined cells. Without branches, so that it vectorises: what is not joined is read (it is
+/// coarse_values = sums over the joined cells, in this rank's part of the coarser level. Without branches, so that it vectorises: what is not joined is read (it is
 /// never beyond the halo) and counts nothing.
 template <class Field>
 void restrict_sums(const MultigridLevel& fine, const IndexSpace& coarse, const Field& values, const Field& coarse_values) {
   const IndexSpace index = fine.index;
   const int s1 = index.stride(1), s2 = index.stride(2);
-  for_owned(cycle_label<Field>("restrict"), coarse, KOKKOS_LAMBDA(int i, int j, int k) {
+  for_owned(cycle_label<Field>("restrict"), fine.part, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1],
                              fine.factor[2] * k + fine.shift[2]);
     const CycleReal w0 = children(fine, 0, i) - 1, w1 = children(fine, 1, j) - 1, w2 = children(fine, 2, k) - 1;
     const auto pair = [&](int at) { return value_at(values, at) + w0 * value_at(values, at + 1); };
-    set_value(coarse_values, coarse.cell(i, j, k),
+    set_value(coarse_values, coarse.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2]),
               pair(c) + w1 * pair(c + s1) + w2 * (pair(c + s2) + w1 * pair(c + s1 + s2)));
   });
 }
@@ -234,9 +238,10 @@ void add_correction(const MultigridLevel& level, const IndexSpace& coarse, const
   // Factors are 1 or 2: shifts of bits for divisions, which would keep the loop from vectorising.
   const int b0 = level.factor[0] - 1, b1 = level.factor[1] - 1, b2 = level.factor[2] - 1;
   const int o0 = level.factor[0] - level.shift[0], o1 = level.factor[1] - level.shift[1], o2 = level.factor[2] - level.shift[2];
+  const int t0 = level.begin[0] - 1, t1 = level.begin[1] - 1, t2 = level.begin[2] - 1;
   for_owned_rounded(cycle_label<Field>("prolong"), index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    const int from = coarse.cell(((i + o0) >> b0) - 1, ((j + o1) >> b1) - 1, ((k + o2) >> b2) - 1);
+    const int from = coarse.cell(((i + o0) >> b0) + t0, ((j + o1) >> b1) + t1, ((k + o2) >> b2) + t2);
     const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
     set_value(x, c, value_at(x, c) + unknown * value_at(correction, from));
   });

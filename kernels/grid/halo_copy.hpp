@@ -77,4 +77,21 @@ void copy_shifted(const IndexSpace& index, const CellBox& target, int d, int shi
   });
 }
 
+/// buffer = the values of cells cell[first .. last), those of each cell side by side.
+template <class Field, class Buffer>
+void pack_cells(const Array<int>& cell, int first, int last, const Field& field, const Buffer& buffer) {
+  const auto cells = cell;
+  const int components = static_cast<int>(Field::rank) == 1 ? 1 : static_cast<int>(field.extent(1));
+  Kokkos::parallel_for("corpuscle::halo::pack_cells", Policy(first, last),
+                       KOKKOS_LAMBDA(int e) { pack_cell(field, cells(e), buffer, components * e, 1); });
+}
+
+template <class Field, class Buffer>
+void unpack_cells(const Array<int>& cell, int first, int last, const Buffer& buffer, const Field& field) {
+  const auto cells = cell;
+  const int components = static_cast<int>(Field::rank) == 1 ? 1 : static_cast<int>(field.extent(1));
+  Kokkos::parallel_for("corpuscle::halo::unpack_cells", Policy(first, last),
+                       KOKKOS_LAMBDA(int e) { unpack_cell(field, cells(e), buffer, components * e, 1); });
+}
+
 }  // namespace corpuscle

@@ -1,5 +1,5 @@
-// What each node is: fluid, immersed, inside. No step needs a neighbour's answer from another rank: every rank holds
-// all surfaces and classifies its halo itself.
+// What each node is: fluid, immersed, inside. Once the band's keys and cut links are there, those of the halo from other
+// ranks, no step needs a neighbour's answer: every rank holds all surfaces and classifies its halo itself.
 #pragma once
 
 #include "immersed/band.hpp"

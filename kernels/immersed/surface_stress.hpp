@@ -32,6 +32,8 @@ inline SurfaceStress make_surface_stress(const std::string& label, int vertices)
 /// Stands for the pressure of a vertex that no fluid node informs. Zero would be a pressure, at whose level the vertex
 /// would be pushed or pulled.
 constexpr double no_pressure = 1e300;
+/// The same in a film, to another body, that has no fluid nodes.
+constexpr double unseen_pressure = 2 * no_pressure;
 KOKKOS_INLINE_FUNCTION bool has_pressure(double p) { return !(p >= 0.5 * no_pressure); }
 
 /// Force of the pressure on vertex i, nN: minus its integral times the outward normal and the function that falls
@@ -60,14 +62,17 @@ KOKKOS_INLINE_FUNCTION Vec3 fluid_force(const SurfaceSet& s, const SurfaceStress
 
 /// Fills the pressures that are missing in `found` with the mean over the neighbours that have one, or else over the body:
 /// the level enters as it does elsewhere. traction = -p n + viscous part, [vertex, 3] kPa.
-inline void complete_stress(const SurfaceSet& surface, const SurfaceStress& found, const SurfaceStress& stress,
-                            const Components<double>& traction) {
+/// @returns the lowest vertex of unseen_pressure without a neighbour that has one, or no_vertex: its load is a guess
+inline int complete_stress(const SurfaceSet& surface, const SurfaceStress& found, const SurfaceStress& stress,
+                           const Components<double>& traction) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const SurfaceSet s = surface;
   const SurfaceStress in = found, out = stress;
   const auto total = traction;
-  Kokkos::parallel_for(
-      "corpuscle::immersed::complete_stress", Team(s.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team::member_type& team) {
+  int guessed = no_vertex;
+  Kokkos::parallel_reduce(
+      "corpuscle::immersed::complete_stress", Team(s.bodies, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const Team::member_type& team, int& lowest) {
         const int b = team.league_rank(), first = s.first_vertex(b), last = s.first_vertex(b + 1);
         Sums<2> known;
         Kokkos::parallel_reduce(
@@ -77,21 +82,31 @@ inline void complete_stress(const SurfaceSet& surface, const SurfaceStress& foun
             },
             known);
         const double mean = known[1] > 0 ? known[0] / known[1] : 0;
-        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last), [&](int i) {
-          double p = in.pressure(i);
-          if (!has_pressure(p)) {
-            double sum = 0;
-            int neighbours = 0;
-            for (int r = s.ring_start(i); r < s.ring_start(i + 1); ++r) {
-              const double q = in.pressure(s.triangle(s.ring_triangle(r), (s.ring_corner(r) + 1) % 3));
-              if (has_pressure(q)) sum += q, ++neighbours;
-            }
-            p = neighbours > 0 ? sum / neighbours : mean;
-          }
-          out.set(i, p, in.viscous(i));
-          store(total, i, in.viscous(i) - p * load(s.normal, i));
+        int here = no_vertex;
+        Kokkos::parallel_reduce(
+            Kokkos::TeamThreadRange(team, first, last),
+            [&](int i, int& least) {
+              double p = in.pressure(i);
+              if (!has_pressure(p)) {
+                double sum = 0;
+                int neighbours = 0;
+                for (int r = s.ring_start(i); r < s.ring_start(i + 1); ++r) {
+                  const double q = in.pressure(s.triangle(s.ring_triangle(r), (s.ring_corner(r) + 1) % 3));
+                  if (has_pressure(q)) sum += q, ++neighbours;
+                }
+                p = neighbours > 0 ? sum / neighbours : mean;
+                if (neighbours == 0 && in.pressure(i) > 1.5 * no_pressure && i < least) least = i;
+              }
+              out.set(i, p, in.viscous(i));
+              store(total, i, in.viscous(i) - p * load(s.normal, i));
+            },
+            Kokkos::Min<int>(here));
+        Kokkos::single(Kokkos::PerTeam(team), [&]() {
+          if (here < lowest) lowest = here;
         });
-      });
+      },
+      Kokkos::Min<int>(guessed));
+  return guessed < no_vertex ? guessed : no_vertex;
 }
 
 /// Force (0 to 2) and torque about `centre` (3 to 5) of each body: [body, 6], nN and nN um. The vertices of a body are

@@ -6,11 +6,18 @@
 
 namespace corpuscle {
 
-/// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank
-/// holds all surfaces.
+constexpr int no_vertex = 1 << 30;
+
+/// Vertices and triangles are numbered over all bodies; triangles are counter-clockwise seen from outside. Every rank holds all
+/// surfaces, or those that reach into its block (SharedCells): then copies of other ranks' cells, and of its own where a
+/// periodic side brings them back, follow its own cells, shifted to where this block sees them. Arrays may have room for more
+/// than there is.
 struct SurfaceSet {
   int bodies = 0, vertices = 0, triangles = 0;
   int cells = 0;              // the first bodies are membranes, the others rigid
+  int own_cells = 0;          // the first membranes are this rank's own, the others copies
+  int own_vertices = 0;       // of them
+  Array<int> number;          // [body] of the cell in the whole scene, the same for its copies; of a rigid body among those
   Components<double> x;       // [vertex, 3] um
   Components<double> v;       // [vertex, 3] um/us
   Components<double> normal;  // [vertex, 3] outward unit normal, area weighted
@@ -23,7 +30,7 @@ struct SurfaceSet {
   Array<int> first_triangle;  // [bodies + 1]
   Array<int> ring_start;      // [vertices + 1] into ring_triangle
   Array<int> ring_triangle;   // triangles around each vertex, in order
-  Array<int> ring_corner;     // [as ring_triangle] which corner of that triangle the vertex is: 0, 1, 2
+  Array<std::int8_t> ring_corner;  // [as ring_triangle] which corner of that triangle the vertex is: 0, 1, 2
 };
 
 }  // namespace corpuscle

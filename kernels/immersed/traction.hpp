@@ -27,7 +27,7 @@ enum TractionFallback {
 
 /// What the fits of one vertex need.
 struct TractionVertex {
-  int vertex;
+  int vertex, image;
   SidePoint side;
   double xi[3];
   Vec3 row[3];     // gradients of the index coordinates
@@ -37,8 +37,8 @@ struct TractionVertex {
 KOKKOS_INLINE_FUNCTION TractionVertex describe_vertex(const Lattice& lattice, const SurfaceSet& s, const Images& images,
                                                       const PlaceViews& places, int v) {
   TractionVertex t;
-  t.vertex = v;
   const int m = places.image(v), item = m * s.vertices + v;
+  t.vertex = v, t.image = m;
   LatticePoint q;
   for (int d = 0; d < 3; ++d) t.xi[d] = places.xi(item, d);
   lattice.set(q, t.xi);
@@ -95,12 +95,14 @@ KOKKOS_INLINE_FUNCTION void fit_basis(const Vec3& y, double (&phi)[N]) {
   }
 }
 
-/// Gradient of each velocity component in index-scaled coordinates; false if the points do not carry the fit.
+/// Gradient of each velocity component in index-scaled coordinates; false if the points do not carry the fit. They carry it
+/// if its slope along the normal answers a motion of the surface at least as a line to the farthest point would: where all
+/// points lie in a few planes, one that answers less, or with the wrong sign, would drive the surface instead of resisting it.
 template <int N>
 KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
                                          const Vec3& v, double farthest, Vec3 (&gradient)[3]) {
   NormalMatrix<N> normal;
-  double right[3][N] = {};
+  double right[3][N] = {}, answer[N] = {};
   int points = 0;
   for_nodes_around(in, t, farthest, [&](int c, const Vec3& y, const Vec3&, double w) {
     const Vec3 du = load(u, c) - v;
@@ -109,10 +111,15 @@ KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Component
     normal.add(phi, w);
     for (int k = 0; k < N; ++k) {
       for (int d = 0; d < 3; ++d) right[d][k] += w * phi[k] * du[d];
+      answer[k] += w * phi[k];
     }
     ++points;
   });
   if (points < N + 2 || !normal.factorise(N == 9 ? 1e-3 : 5e-3)) return false;
+  normal.solve(answer);
+  double slope = 0;
+  for (int d = 0; d < 3; ++d) slope += answer[d] * dot(t.row[d], t.side.normal);
+  if (!(slope * t.spacing * fit_radius > 1)) return false;
   for (int d = 0; d < 3; ++d) {
     normal.solve(right[d]);
     gradient[d] = {right[d][0], right[d][1], right[d][2]};
@@ -154,7 +161,7 @@ KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Compo
 /// A fit of the pressure. Differences from the first point are fitted: the level of the pressure is not rounded.
 struct PressureFit {
   double value = 0, mean = 0;  // kPa: the fit's at the vertex; weighted average of the points
-  int points = 0;
+  int points = 0, fluid = 0;     // how many; those in the fluid
 };
 
 /// Linear fit of the pressure at the vertex from points up to `farthest`. @returns whether the points carry it
@@ -162,11 +169,12 @@ KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<dou
                                          double farthest, PressureFit& fit) {
   NormalMatrix<4> normal;
   double right[4] = {0, 0, 0, 0}, level = 0;
-  fit.points = 0;
+  fit.points = fit.fluid = 0;
   for_nodes_around(in, t, farthest, [&](int c, const Vec3& y, const Vec3&, double w) {
     const NodeKind kind = in.nodes.kind(c);
     // In a pocket no fluid is near: what an immersed node there has for a pressure is nobody's. An outflow's is given.
     if (kind != NodeKind::fluid && !in.extended(c)) return;
+    if (kind == NodeKind::fluid) ++fit.fluid;
     if (fit.points == 0) level = p(c);
     const double phi[4] = {1, y.x, y.y, y.z};
     normal.add(phi, w);
@@ -180,11 +188,29 @@ KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<dou
   return true;
 }
 
+/// Whether a node near the vertex belongs to another body, or another image of its own.
+KOKKOS_INLINE_FUNCTION bool another_near(const StencilInput& in, const TractionVertex& t) {
+  const unsigned triangles = static_cast<unsigned>(in.surface.triangles);
+  bool found = false;
+  for_nodes_around(in, t, fit_radius, [&](int c, const Vec3&, const Vec3&, double) {
+    const Key key = in.band.key(c);
+    if (key == no_key) return;
+    const int image = static_cast<int>(key_item(key) / triangles);
+    found = found || key_body(in.surface.triangle_body, key) != t.side.body || image != t.image;
+  });
+  return found;
+}
+
 KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
                                             double& value) {
   PressureFit fit;
   int how = pressure_fitted;
-  if (!fit_pressure(in, p, t, fit_radius, fit)) {
+  const bool fitted = fit_pressure(in, p, t, fit_radius, fit);
+  if (fit.fluid == 0 && another_near(in, t)) {  // in a film without fluid nodes: pressures at its rim are not its own
+    value = unseen_pressure;
+    return pressure_nothing;
+  }
+  if (!fitted) {
     // Where the surface runs along a grid plane, a single layer of fluid nodes may be in reach: the layer between it and
     // the surface, to which the pressure was extended, carries the slope.
     how = pressure_wide;

@@ -9,7 +9,8 @@ namespace corpuscle {
 using Key = unsigned long long;
 constexpr Key no_key = ~0ull;
 
-/// Shifts under which the surfaces are seen: the identity, and one period up and down each periodic direction.
+/// Shifts under which the surfaces are seen: the identity, and one period up and down each periodic direction. The number of
+/// an image has a digit of base 3 for each such direction, the first one's last: 0 none, 1 up, 2 down.
 struct Images {
   int count = 1;
   Vec3 shift[27];
@@ -84,6 +85,11 @@ struct NodeBox {
     i[0] = lower[0] + e % extent(0);
     i[1] = lower[1] + (e / extent(0)) % extent(1);
     i[2] = lower[2] + e / (extent(0) * extent(1));
+  }
+  NodeBox grown(int nodes) const {
+    NodeBox b = *this;
+    for (int d = 0; d < 3; ++d) b.lower[d] -= nodes, b.upper[d] += nodes;
+    return b;
   }
   KOKKOS_INLINE_FUNCTION NodeBox clipped(const int (&lo)[3], const int (&hi)[3]) const {
     NodeBox b = *this;

@@ -1,33 +1,25 @@
-// From vertices to markers: which images of each vertex reach this rank's faces, and where they are in index space.
+// From vertices to markers: which vertices reach this rank's faces, and where they are in index space.
 #pragma once
 
+#include "immersed/surface_views.hpp"
 #include "transfer/marker_views.hpp"
 
 namespace corpuscle {
 
-/// Shifts under which vertices are seen, and how many periods each is: the identity first.
-struct PeriodImages {
-  int count = 1;
-  Vec3 shift[27];
-  int turns[27][3] = {};
-};
-
 struct MarkerSearch {
   Lattice lattice;
-  PeriodImages images;
   Vec3 lower, upper;  // bounds of the lattice in space, with a margin
   double reach;       // of the kernel
 };
 
-/// What is remembered of each vertex from one step to the next.
+/// What is remembered of each vertex from one step to the next. Arrays may have room for more.
 struct VertexPlaces {
-  Table<double> xi;       // [vertex, 3] where it was last found in the lattice
-  Array<int> image;       // [vertex] under which image; -1 before it was
-  Array<unsigned> reach;  // [vertex] bit for each image that reaches this rank's faces
-  Array<int> first;       // [vertex + 1] of its markers
-  Array<int> beyond;      // [1] lowest vertex found beyond a side
+  int vertices = 0;
+  Table<double> xi;             // [vertex, 3] where it was last found in the lattice
+  Array<unsigned char> known;   // [vertex] 1 if it was, at the last look
+  Array<unsigned char> reach;   // [vertex] 1 if it reaches this rank's faces
+  Array<int> beyond;            // [1] lowest vertex found beyond a side
 };
-constexpr int no_vertex = 1 << 30;
 
 /// Index coordinates in which walls are half a cell away from the first cell.
 KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const LatticePoint& q, double (&eta)[3]) {
@@ -57,118 +49,112 @@ KOKKOS_INLINE_FUNCTION bool reaches(const MarkerSearch& s, const double (&eta)[3
   return near && !beyond;
 }
 
-/// The image's place in the lattice, from a guess if there is one. @returns `outside` for one whose place is extrapolated
-KOKKOS_INLINE_FUNCTION Located locate_image(const Lattice& lattice, const Vec3& p, bool guessed, LatticePoint& q) {
-  Located found = guessed ? lattice.locate(p, q) : Located::failed;
-  if (found != Located::inside) {  // it may have been carried round a periodic direction
+/// A vertex's place in the lattice, from a guess if there is one. @returns false if it is not to be found
+KOKKOS_INLINE_FUNCTION bool locate_vertex(const Lattice& lattice, const Vec3& p, bool guessed, LatticePoint& q) {
+  if (!guessed || lattice.locate(p, q) != Located::inside) {
     lattice.coarse_start(p, q);
-    found = lattice.locate(p, q);
+    if (lattice.locate(p, q) == Located::failed) return false;
   }
-  if (found != Located::failed) lattice.polish(p, q);
-  return found;
+  lattice.polish(p, q);
+  return true;
 }
 
-KOKKOS_INLINE_FUNCTION Vec3 image_position(const PeriodImages& images, const Vec3& x, int m) { return x + images.shift[m]; }
-
-/// Start for the image m of a vertex that was found as image `from` at xi.
-KOKKOS_INLINE_FUNCTION void image_guess(const MarkerSearch& s, const double (&xi)[3], int from, int m, LatticePoint& q) {
-  double start[3];
-  for (int d = 0; d < 3; ++d) start[d] = xi[d] + (s.images.turns[m][d] - s.images.turns[from][d]) * s.lattice.index.global[d];
-  s.lattice.set(q, start);
+KOKKOS_INLINE_FUNCTION bool within_bounds(const MarkerSearch& s, const Vec3& p) {
+  return p.x >= s.lower.x && p.x <= s.upper.x && p.y >= s.lower.y && p.y <= s.upper.y && p.z >= s.lower.z && p.z <= s.upper.z;
 }
 
-/// Fills places.xi, image, reach and beyond.
-inline void find_images(const MarkerSearch& search, const Components<double>& x, const VertexPlaces& places) {
+/// Fills places.xi, known, reach and beyond.
+inline void find_vertices(const MarkerSearch& search, const Components<double>& x, const VertexPlaces& places) {
   const auto beyond = places.beyond;
   Kokkos::deep_copy(Exec(), beyond, no_vertex);
   const MarkerSearch s = search;
   const VertexPlaces out = places;
   Kokkos::parallel_for(
-      "corpuscle::transfer::find_images", Policy(0, static_cast<int>(places.image.extent(0))), KOKKOS_LAMBDA(int v) {
-        const Vec3 here = load(x, v);
-        const double xi[3] = {out.xi(v, 0), out.xi(v, 1), out.xi(v, 2)};
-        const int from = out.image(v);
-        unsigned mask = 0;
-        int found = -1, better = 0;  // what reaches this rank's faces before what is in the lattice at all
-        for (int m = 0; m < s.images.count; ++m) {
-          const Vec3 p = image_position(s.images, here, m);
-          if (!(p.x >= s.lower.x && p.x <= s.upper.x && p.y >= s.lower.y && p.y <= s.upper.y && p.z >= s.lower.z &&
-                p.z <= s.upper.z))
-            continue;
-          LatticePoint q;
-          if (from >= 0) image_guess(s, xi, from, m, q);
-          const Located located = locate_image(s.lattice, p, from >= 0, q);
-          if (located == Located::failed) continue;
-          double eta[3];
-          lattice_to_index(s.lattice, q, eta);
-          bool outside;
-          if (reaches(s, eta, outside)) mask |= 1u << m;
-          if (outside) Kokkos::atomic_fetch_min(&out.beyond(0), v);
-          const int good = mask >> m & 1u ? 3 : (located == Located::inside ? 2 : 1);
-          if (good <= better) continue;
-          found = m, better = good;
-          for (int d = 0; d < 3; ++d) out.xi(v, d) = q.xi(d);
+      "corpuscle::transfer::find_vertices", Policy(0, places.vertices), KOKKOS_LAMBDA(int v) {
+        const Vec3 p = load(x, v);
+        const bool guessed = out.known(v);
+        out.reach(v) = out.known(v) = 0;
+        if (!within_bounds(s, p)) return;
+        LatticePoint q;
+        if (guessed) {
+          const double xi[3] = {out.xi(v, 0), out.xi(v, 1), out.xi(v, 2)};
+          s.lattice.set(q, xi);
         }
-        out.image(v) = found;
-        out.reach(v) = mask;
+        if (!locate_vertex(s.lattice, p, guessed, q)) return;
+        double eta[3];
+        lattice_to_index(s.lattice, q, eta);
+        bool outside;
+        out.reach(v) = reaches(s, eta, outside) ? 1 : 0;
+        if (outside) Kokkos::atomic_fetch_min(&out.beyond(0), v);
+        out.known(v) = 1;
+        for (int d = 0; d < 3; ++d) out.xi(v, d) = q.xi(d);
       });
 }
 
-KOKKOS_INLINE_FUNCTION int count_bits(unsigned mask) {
-  int n = 0;
-  for (; mask; mask &= mask - 1) ++n;
-  return n;
+/// Vertices that are others than before begin their search where their body's first one is: the search from nothing is long.
+inline void seed_places(const MarkerSearch& search, const SurfaceSet& set, const VertexPlaces& places) {
+  using Team = Kokkos::TeamPolicy<Exec>::member_type;
+  const MarkerSearch s = search;
+  const VertexPlaces out = places;
+  const auto x = set.x;
+  const auto first_vertex = set.first_vertex;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::seed_places", Kokkos::TeamPolicy<Exec>(set.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
+        const int first = first_vertex(team.league_rank()), last = first_vertex(team.league_rank() + 1);
+        Kokkos::single(Kokkos::PerTeam(team), [&]() {
+          LatticePoint q;
+          const bool found = locate_vertex(s.lattice, load(x, first), false, q);
+          out.known(first) = found ? 1 : 0;
+          for (int d = 0; d < 3; ++d) out.xi(first, d) = q.xi(d);
+        });
+        team.team_barrier();
+        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first + 1, last), [&](int v) {
+          out.known(v) = out.known(first);
+          for (int d = 0; d < 3; ++d) out.xi(v, d) = out.xi(first, d);
+        });
+      });
 }
 
-/// places.first, and how many markers there are.
-inline int number_markers(const VertexPlaces& places) {
+/// How many markers there are, and the vertex of each, in the order of vertices.
+inline int number_markers(const VertexPlaces& places, const MarkerViews& markers, int room) {
   const auto reach = places.reach;
-  const auto first = places.first;
-  const int vertices = static_cast<int>(places.image.extent(0));
+  const auto vertex = markers.vertex;
   int total = 0;
   Kokkos::parallel_scan(
-      "corpuscle::transfer::number_markers", Policy(0, vertices + 1),
+      "corpuscle::transfer::number_markers", Policy(0, places.vertices),
       KOKKOS_LAMBDA(int v, int& sum, bool last) {
-        if (last) first(v) = sum;
-        if (v < vertices) sum += count_bits(reach(v));
+        if (!reach(v)) return;
+        if (last && sum < room) vertex(sum) = v;
+        ++sum;
       },
       total);
   return total;
 }
 
-/// Fills vertex, home and eta of the markers. Which node is nearest is rounded, so that ranks which see the same point under
+/// Fills home and eta of the markers. Which node is nearest is rounded, so that ranks which see the same point under
 /// a shift agree on the tie.
-inline void fill_markers(const MarkerSearch& search, const Components<double>& x, const VertexPlaces& places,
-                         const MarkerViews& markers) {
+inline void fill_markers(const MarkerSearch& search, const VertexPlaces& places, const MarkerViews& markers) {
   const MarkerSearch s = search;
   const VertexPlaces in = places;
   const MarkerViews out = markers;
   Kokkos::parallel_for(
-      "corpuscle::transfer::fill_markers", Policy(0, static_cast<int>(places.image.extent(0))), KOKKOS_LAMBDA(int v) {
-        const unsigned mask = in.reach(v);
+      "corpuscle::transfer::fill_markers", Policy(0, markers.count), KOKKOS_LAMBDA(int marker) {
+        const int v = out.vertex(marker);
         const double xi[3] = {in.xi(v, 0), in.xi(v, 1), in.xi(v, 2)};
-        int marker = in.first(v);
-        for (int m = 0; m < s.images.count; ++m) {
-          if (!(mask >> m & 1u)) continue;
-          const Vec3 p = image_position(s.images, load(x, v), m);
-          LatticePoint q;
-          image_guess(s, xi, in.image(v), m, q);
-          locate_image(s.lattice, p, true, q);
-          double eta[3];
-          lattice_to_index(s.lattice, q, eta);
-          bool home = true;
-          for (int d = 0; d < 3; ++d) {
-            if (s.lattice.boundary_below[d] && eta[d] < -0.5) eta[d] = -0.5;
-            if (s.lattice.boundary_above[d] && eta[d] > s.lattice.index.n[d] - 0.5) eta[d] = s.lattice.index.n[d] - 0.5;
-            out.eta(marker, d) = eta[d];
-            const double nearest = std::floor(std::floor((eta[d] + 0.5) * 1073741824.0 + 0.5) / 1073741824.0);
-            home = home && (nearest >= 0 || s.lattice.boundary_below[d]) &&
-                   (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
-          }
-          out.vertex(marker) = v;
-          out.home(marker) = home ? 1 : 0;
-          ++marker;
+        LatticePoint q;
+        s.lattice.set(q, xi);
+        double eta[3];
+        lattice_to_index(s.lattice, q, eta);
+        bool home = true;
+        for (int d = 0; d < 3; ++d) {
+          if (s.lattice.boundary_below[d] && eta[d] < -0.5) eta[d] = -0.5;
+          if (s.lattice.boundary_above[d] && eta[d] > s.lattice.index.n[d] - 0.5) eta[d] = s.lattice.index.n[d] - 0.5;
+          out.eta(marker, d) = eta[d];
+          const double nearest = std::floor(std::floor((eta[d] + 0.5) * 1073741824.0 + 0.5) / 1073741824.0);
+          home = home && (nearest >= 0 || s.lattice.boundary_below[d]) &&
+                 (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
         }
+        out.home(marker) = home ? 1 : 0;
       });
 }
 

@@ -19,27 +19,24 @@ struct InsideViews {
   Array<int> part[3];  // [cell]
 };
 
-/// Triangles whose interior is `material`, by the cell they are of.
+/// Triangles whose interior is `material`, by the cell they are of. Copies of cells beyond periodic sides are bodies of their own.
 struct InsideSurface {
   Table<int> triangle;       // [triangle, 3] vertex numbers
   Array<int> triangle_body;  // [triangle]
-  Array<int> material;       // [body]
+  Array<int> type;           // [body]
+  Array<int> material;       // [type]
+  Table<int> turns;          // [body, 3] periods by which it has been shifted to where this block sees it
 };
 
-/// Where a vertex is in index space, in units, as if it had not been shifted by periods. @returns false if it was not
-/// found
-KOKKOS_INLINE_FUNCTION bool unshifted_place(const MarkerSearch& s, const VertexPlaces& places, int v,
-                                            std::int64_t (&at)[3]) {
-  const int image = places.image(v);
-  if (image < 0) return false;
+/// Where a vertex is in index space, in units. @returns false if it was not found
+KOKKOS_INLINE_FUNCTION bool place_in_units(const MarkerSearch& s, const VertexPlaces& places, int v, std::int64_t (&at)[3]) {
+  if (!places.known(v)) return false;
   const double xi[3] = {places.xi(v, 0), places.xi(v, 1), places.xi(v, 2)};
   LatticePoint q;
   s.lattice.set(q, xi);
   double eta[3];
   lattice_to_index(s.lattice, q, eta);
-  for (int d = 0; d < 3; ++d)
-    at[d] = static_cast<std::int64_t>(std::floor(eta[d] * inside_unit + 0.5)) -
-            inside_unit * s.images.turns[image][d] * s.lattice.index.global[d];
+  for (int d = 0; d < 3; ++d) at[d] = static_cast<std::int64_t>(std::floor(eta[d] * inside_unit + 0.5));
   return true;
 }
 
@@ -76,7 +73,7 @@ KOKKOS_INLINE_FUNCTION int cross_triangle(const std::int64_t (&corner)[3][2], co
 
 KOKKOS_INLINE_FUNCTION std::int64_t floor_units(std::int64_t a) { return a >> inside_bits; }
 
-/// One image of a triangle: what it changes on the lines along d of this block.
+/// What a triangle changes on the lines along d of this block.
 KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int64_t (&corner)[3][3], int d, int turns,
                                           const Array<int>& part) {
   const IndexSpace& index = lattice.index;
@@ -124,44 +121,27 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
 /// over all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface
 /// whose earlier crossings are at the other end. Any sum of integers is the same in any order.
 inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface,
-                            int material, const InsideViews& inside) {
+                            int triangles, int material, const InsideViews& inside) {
   for (const auto& part : inside.part) Kokkos::deep_copy(Exec(), part, 0);
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
   const InsideSurface of = surface;
   const InsideViews out = inside;
   Kokkos::parallel_for(
-      "corpuscle::transfer::inside_crossings", Policy(0, static_cast<int>(surface.triangle_body.extent(0))),
-      KOKKOS_LAMBDA(int t) {
-        if (of.material(of.triangle_body(t)) != material) return;
+      "corpuscle::transfer::inside_crossings", Policy(0, triangles), KOKKOS_LAMBDA(int t) {
+        const int body = of.triangle_body(t);
+        if (of.material(of.type(body)) != material) return;
         std::int64_t corner[3][3];
         for (int k = 0; k < 3; ++k)
-          if (!unshifted_place(s, places, of.triangle(t, k), corner[k])) return;
+          if (!place_in_units(s, places, of.triangle(t, k), corner[k])) return;
         const IndexSpace& index = s.lattice.index;
-        // The shifts that bring it to this block.
-        int first[3], last[3];
         for (int d = 0; d < 3; ++d) {
           std::int64_t low = corner[0][d], high = low;
           for (int k = 1; k < 3; ++k)
             low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
-          const int most = index.periodic[d] ? 1 : 0;
-          first[d] = most + 1, last[d] = -most - 1;
-          for (int turns = -most; turns <= most; ++turns) {
-            const std::int64_t shift = inside_unit * turns * index.global[d];
-            if (high + shift < -inside_unit || low + shift > index.n[d] * inside_unit) continue;
-            first[d] = turns < first[d] ? turns : first[d];
-            last[d] = turns;
-          }
+          if (high < -inside_unit || low > index.n[d] * inside_unit) return;
         }
-        for (int tk = first[2]; tk <= last[2]; ++tk)
-          for (int tj = first[1]; tj <= last[1]; ++tj)
-            for (int ti = first[0]; ti <= last[0]; ++ti) {
-              const int turns[3] = {ti, tj, tk};
-              std::int64_t here[3][3];
-              for (int k = 0; k < 3; ++k)
-                for (int d = 0; d < 3; ++d) here[k][d] = corner[k][d] + inside_unit * turns[d] * index.global[d];
-              for (int d = 0; d < 3; ++d) add_crossings(s.lattice, here, d, turns[d], out.part[d]);
-            }
+        for (int d = 0; d < 3; ++d) add_crossings(s.lattice, corner, d, of.turns(body, d), out.part[d]);
       });
 }
 

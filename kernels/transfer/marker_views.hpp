@@ -1,22 +1,22 @@
-// Markers: the points that pass forces to the grid and take velocities from it. A vertex has a marker in every place where
-// its kernel touches faces of this rank: itself, and copies moved by periods. So no kernel knows of periods or ranks.
+// Markers: the points that pass forces to the grid and take velocities from it. A vertex has a marker where its kernel touches
+// faces of this rank; of a cell near the sides of the rank's block there are copies on other ranks, and beyond periodic sides,
+// whose vertices have markers of their own. So no kernel knows of periods or ranks.
 #pragma once
 
 #include "immersed/lattice.hpp"
+#include "immersed/surface_views.hpp"
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 310 bytes.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 210 bytes.
 struct MarkerViews {
   int count = 0;
   Array<int> vertex;            // [marker] where it comes from
-  Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex, of all ranks, that lies in its rank's own cells
+  Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex and its copies, of all ranks, that lies in its rank's own cells
   Table<double> eta;            // [marker, 3] position in index space: cells of this rank at 0, 1, ...; walls half a cell away
   Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
   Table<double> weight;         // [marker, 6 points] of those lines of points
-  Table<double> inverse;        // [marker, 9] of the matrix of face areas that it sees, 1/um2
   Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
-  Components<double> velocity;  // [marker, 3] um/us: its share of its vertex's
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers
   Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces

@@ -46,11 +46,47 @@ struct SlipViews {
   Components<double> force;  // [vertex, 3] nN, of the membrane on the fluid
   Components<double> normal;
   Array<double> area;  // [vertex] um2
-  Array<double> chi;   // [vertex] from 1 for a membrane alone to 0 where others are near; without values: 1
+  Array<double> gap;   // [vertex] um to the nearest other surface; without values nothing is near
 };
 
+/// How much of the slip is left at a gap of so many spacings: all above 1.5, none below 0.5. A velocity that belongs to one
+/// membrane would let two of them cross; one that all take from the same field cannot, since it is continuous.
+KOKKOS_INLINE_FUNCTION double slip_share(double spacings) {
+  const double t = spacings - 0.5;
+  return t <= 0 ? 0 : (t >= 1 ? 1 : t * t * (3 - 2 * t));
+}
+constexpr double slip_reach = 1.5;  // spacings
+
+/// How much is left beside a side that gives the velocity, of the slip along it. There the kernel is folded back, and a force
+/// along a plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side
+/// itself (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
+KOKKOS_INLINE_FUNCTION double slip_share_along_side(double spacings) {
+  constexpr double whole = 0.6;
+  if (spacings >= whole) return 1;
+  const double left = spacings > 0 ? 1 - spacings / whole : 1;
+  return 1 - left * left;
+}
+
+/// Takes from v what half of the way to no slip takes beside the block's sides: applied to the force and to the motion, so that
+/// the one is as the other for both. Across a side less is left than along it, so that no slip carries a membrane through it.
+KOKKOS_INLINE_FUNCTION Vec3 fade_at_sides(const TransferBlock& block, const double (&eta)[3], const Vec3 (&along)[3], Vec3 v) {
+  for (int d = 0; d < 3; ++d)
+    for (int end = 0; end < 2; ++end) {
+      if (!(end == 0 ? block.lattice.boundary_below[d] : block.lattice.boundary_above[d])) continue;
+      if (block.reflection[d][end][1] > 0) continue;  // fluid leaves through it
+      const double gap = end == 0 ? eta[d] + 0.5 : block.index().n[d] - 0.5 - eta[d];
+      if (gap >= slip_reach) continue;
+      const Vec3 across = cross(along[(d + 1) % 3], along[(d + 2) % 3]), n = (1 / norm(across)) * across;
+      const bool sticks = block.reflection[d][end][0] < 0;
+      const double beside = sticks ? std::sqrt(slip_share_along_side(gap)) : 1, through = std::sqrt(slip_share(gap));
+      v = beside * v + ((through - beside) * dot(v, n)) * n;
+    }
+  return v;
+}
+
 /// Of a marker's vertex, um/us.
-KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const Lattice& lattice, const SlipViews& slip, const MarkerViews& m, int marker) {
+KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const SlipViews& slip, const MarkerViews& m, int marker) {
+  const Lattice& lattice = block.lattice;
   const int v = m.vertex(marker);
   const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
   LatticePoint q;
@@ -59,31 +95,40 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const Lattice& lattice, const SlipView
   Vec3 along[3];
   lattice.cell_tangents(q, along);
   const Vec3 n = load(slip.normal, v), f = load(slip.force, v);
-  const double share = (slip.chi.extent(0) > 0 ? slip.chi(v) : 1.0) / (slip.viscosity * slip.area(v));
-  return share * slip_motion(slip.law, along, n, f - dot(f, n) * n);
+  double share = 1 / (slip.viscosity * slip.area(v));
+  if (slip.gap.extent(0) > 0) {
+    double square = 0;  // of the spacing along the normal
+    for (int d = 0; d < 3; ++d) square += dot(along[d], n) * dot(along[d], n);
+    share *= slip_share(slip.gap(v) / std::sqrt(square));
+  }
+  const Vec3 tangential = fade_at_sides(block, eta, along, f - dot(f, n) * n);
+  return share * fade_at_sides(block, eta, along, slip_motion(slip.law, along, n, tangential));
 }
 
-/// Adds the slip to the velocity of markers that are at home.
-inline void add_slip(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers) {
-  const Lattice lattice = block.lattice;
+/// Adds the slip to the velocity [vertex, 3] of vertices whose marker is at home.
+inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers,
+                     const Components<double>& velocity) {
+  const TransferBlock block = transfer_block;
+  const auto of_vertex = velocity;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   Kokkos::parallel_for(
       "corpuscle::transfer::add_slip", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        if (m.home(marker)) store(m.velocity, marker, load(m.velocity, marker) + slip_velocity(lattice, s, m, marker));
+        const int v = m.vertex(marker);
+        if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(block, s, m, marker));
       });
 }
 
 /// Power of the forces on the slip, nW, of the vertices at home here: friction near the membranes that the kernel smears away.
-inline double slip_power(const TransferBlock& block, const SlipViews& slip, const MarkerViews& markers) {
-  const Lattice lattice = block.lattice;
+inline double slip_power(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   const SlipViews s = slip;
   double power = 0;
   Kokkos::parallel_reduce(
       "corpuscle::transfer::slip_power", Policy(0, m.count),
       KOKKOS_LAMBDA(int marker, double& sum) {
-        if (m.home(marker)) sum += dot(load(s.force, m.vertex(marker)), slip_velocity(lattice, s, m, marker));
+        if (m.home(marker)) sum += dot(load(s.force, m.vertex(marker)), slip_velocity(block, s, m, marker));
       },
       power);
   return power;

@@ -24,7 +24,20 @@ KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double
       }
 }
 
-/// base, weight and inverse of every marker. Weights of points beyond a side are folded back: reflected where the side gives
+/// The inverse of the matrix of face areas that a marker sees: dual.b[d] goes with the faces of direction d.
+template <class Delta>
+KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const double (&eta)[3]) {
+  Vec3 seen[3];
+  for (int d = 0; d < 3; ++d) {
+    Vec3 sum;
+    visit_faces<Delta>(block, eta, d,
+                       [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.sharp_area[d], c); });
+    seen[d] = sum;
+  }
+  return DualBasis(seen[0], seen[1], seen[2]);
+}
+
+/// base and weight of every marker. Weights of points beyond a side are folded back: reflected where the side gives
 /// the velocity (no slip is then exact, and a force keeps its moment about the wall, which takes the rest of it), added where
 /// it gives the derivative.
 template <class Delta>
@@ -47,31 +60,20 @@ void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& mar
             m.base(marker, 3 * faces + e) = static_cast<short>(line.base);
             for (int p = 0; p < points; ++p) m.weight(marker, (3 * faces + e) * points + p) = folded[p];
           }
-        Vec3 seen[3];
-        for (int d = 0; d < 3; ++d) {
-          Vec3 sum;
-          visit_faces<Delta>(block, eta, d,
-                             [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.sharp_area[d], c); });
-          seen[d] = sum;
-        }
-        // Columns of the inverse of the matrix with rows seen[d].
-        const DualBasis dual(seen[0], seen[1], seen[2]);
-        for (int d = 0; d < 3; ++d)
-          for (int n = 0; n < 3; ++n) m.inverse(marker, 3 * d + n) = dual.b[d][n];
       });
 }
 
-KOKKOS_INLINE_FUNCTION Vec3 inverse_column(const MarkerViews& m, int marker, int d) {
-  return {m.inverse(marker, 3 * d), m.inverse(marker, 3 * d + 1), m.inverse(marker, 3 * d + 2)};
-}
-
 /// markers.across of the forces [vertex, 3], nN.
-inline void resolve_forces(const MarkerViews& markers, const Components<double>& force) {
+template <class Delta>
+void resolve_forces(const TransferBlock& transfer_block, const MarkerViews& markers, const Components<double>& force) {
+  const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   Kokkos::parallel_for(
       "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const DualBasis dual = seen_areas<Delta>(block, eta);
         const Vec3 f = load(force, m.vertex(marker));
-        for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(inverse_column(m, marker, d), f);
+        for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
       });
 }
 
@@ -170,13 +172,14 @@ KOKKOS_INLINE_FUNCTION double given_flux(const TransferBlock& block, const Compo
   return flux;
 }
 
-/// velocity of every marker: the part that the faces of this rank give.
+/// velocity [vertex, 3], um/us, of the markers' vertices: the part that the faces of this rank give.
 /// @param u  [cell, 3] um/us, read on the sides of the block
 template <class Delta>
 void interpolate_velocity(const TransferBlock& transfer_block, const Array<double> (&flux)[3], const Components<double>& u,
-                          const MarkerViews& markers) {
+                          const MarkerViews& markers, const Components<double>& velocity) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
+  const auto of_vertex = velocity;
   const FaceForce through{{flux[0], flux[1], flux[2]}};
   Kokkos::parallel_for(
       "corpuscle::transfer::interpolate_velocity", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
@@ -187,7 +190,8 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
         for (int e = 0; e < 3; ++e)
           folded = folded || (block.lattice.boundary_below[e] && eta[e] < Delta::reach) ||
                    (block.lattice.boundary_above[e] && eta[e] > index.n[e] - 1 - Delta::reach);
-        Vec3 velocity;
+        const DualBasis dual = seen_areas<Delta>(block, eta);
+        Vec3 part;
         for (int d = 0; d < 3; ++d) {
           double sum = 0;
           for (int c = 0; c < points; ++c) {
@@ -212,20 +216,9 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
                 return;
               sum += w * given_flux(block, u, d, row, end, load(block.sharp_area[d], c));
             });
-          velocity += sum * inverse_column(m, marker, d);
+          part += sum * dual.b[d];
         }
-        store(m.velocity, marker, velocity);
-      });
-}
-
-/// v [vertex, 3] = the sum over each vertex's markers, in their order.
-inline void collect_velocity(const Array<int>& first, const MarkerViews& markers, const Components<double>& v) {
-  const MarkerViews m = markers;
-  Kokkos::parallel_for(
-      "corpuscle::transfer::collect_velocity", Policy(0, static_cast<int>(first.extent(0)) - 1), KOKKOS_LAMBDA(int i) {
-        Vec3 sum;
-        for (int marker = first(i); marker < first(i + 1); ++marker) sum += load(m.velocity, marker);
-        store(v, i, sum);
+        store(of_vertex, m.vertex(marker), part);
       });
 }
 

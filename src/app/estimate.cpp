@@ -104,16 +104,19 @@ double vertices_of(const BodySettings& body, const SceneSize& size) {
 double levels_over_finest(const SceneSize& size) {
   auto global = size.cells, block = size.block, h = size.spacing;
   double sum = 1;
+  bool gathered = false;
   while (global[0] * global[1] * global[2] > 300) {
     const double least = std::min({h[0], h[1], h[2]});
     bool coarser = false, stuck = false;
     for (int d = 0; d < 3; ++d) {
       if (least * least < 0.4 * h[d] * h[d]) continue;
-      stuck = stuck || block[d] < (size.cut[d] || size.periodic[d] ? 2 * halo : 2);
+      stuck = stuck || block[d] < ((size.cut[d] && !gathered) || size.periodic[d] ? 2 * halo : 2);
       coarser = true;
       global[d] = std::ceil(global[d] / 2), block[d] = std::ceil(block[d] / 2), h[d] *= 2;
     }
     if (stuck || !coarser) break;
+    gathered = global[0] * global[1] * global[2] <= 4096;
+    if (gathered) block = global;
     sum += (block[0] + 2 * halo) * (block[1] + 2 * halo) * (block[2] + 2 * halo) / size.padded();
   }
   return sum;

@@ -42,6 +42,10 @@ constexpr FigureLevel levels[] = {
      "so few grid spacings between a surface and a wall, an inlet or a symmetry side do not resolve the flow between them: refine grid.nodes"},
     {"least_body_spacings", 2, true, Of::itself, "grid.nodes",
      "so few grid spacings between two surfaces do not resolve the film between them: refine grid.nodes"},
+    // Each was put back, at the cost of a push that no force of the model makes.
+    {"crossings", 0, false, Of::itself, "time.step_us",
+     "so many vertices went through another surface and were put back: reduce time.step_us, raise contact.pressure_Pa or "
+     "contact.range_um, or refine grid.nodes"},
     // A linear fit's traction is wrong to first order; a share of the vertices that no sum over a body hides.
     {"traction_fallbacks", 0.05, false, Of::itself, "grid.nodes",
      "that share of the vertices has too few fluid nodes around it for a full fit of the traction: refine grid.nodes"},

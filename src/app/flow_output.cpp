@@ -2,6 +2,7 @@
 
 #include "app/figure_levels.hpp"
 #include "app/reference_flows.hpp"
+#include "cells/cell_state.hpp"
 #include "common/extremes.hpp"
 #include "core/error.hpp"
 #include "core/units.hpp"
@@ -9,6 +10,7 @@
 #include "fluid/flow_balances.hpp"
 #include "membrane/shape_measures.hpp"
 #include "output/owned_values.hpp"
+#include "parallel/agree.hpp"
 
 #include <fmt/format.h>
 
@@ -28,6 +30,29 @@ const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance
 std::vector<std::int32_t> to_int32(const Table<int>& table) {
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
   return {host.data(), host.data() + host.span()};
+}
+#endif
+
+#ifdef CORPUSCLE_HDF5
+SurfaceShare share_of(const SharedCells& cells) {
+  return {static_cast<hsize_t>(cells.total_vertices()), static_cast<hsize_t>(cells.total_triangles()),
+          static_cast<hsize_t>(cells.total()), vertex_rows(cells), triangle_rows(cells), cell_rows(cells)};
+}
+
+/// Vertices are numbered over all ranks' cells.
+std::unique_ptr<CellWriter> make_shared_writer(const std::string& folder, const Comm& comm, const SharedCells& cells,
+                                               std::optional<double> restart_us) {
+  const auto triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().triangle);
+  const auto first_vertex = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().first_vertex);
+  const auto first_triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().first_triangle);
+  std::vector<std::int32_t> triangles, bodies;
+  for (std::size_t c = 0; c < cells.own().size(); ++c)
+    for (int t = first_triangle(c); t < first_triangle(c + 1); ++t) {
+      for (int k = 0; k < 3; ++k)
+        triangles.push_back(static_cast<std::int32_t>(triangle(t, k) - first_vertex(c) + cells.own()[c].first_vertex));
+      bodies.push_back(cells.own()[c].number);
+    }
+  return std::make_unique<CellWriter>(folder, comm, triangles, bodies, share_of(cells), restart_us);
 }
 #endif
 
@@ -57,18 +82,17 @@ FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& si
   if (scene.output.fields)
     fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
                                             simulation.grid().owned_nodes().data(), restart_us);
-  if (scene.output.cells && simulation.surfaces()) {
+  few_cells_ = simulation.cells() <= few_cells || !simulation.shared_cells();
+  if (!few_cells_) scene_.cells = {};
+  if (scene.output.cells && simulation.shared_cells()) {
+    cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
+  } else if (scene.output.cells && simulation.surfaces()) {
     const auto& set = *simulation.surfaces();
     const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
     const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
     cells_ = std::make_unique<CellWriter>(folder_, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
   }
 #endif
-  if (!simulation.membranes()) return;
-  for (const auto& settings : simulation.membranes()->diagnostics()) {
-    first_area_.push_back(settings.rest_area_um2);
-    first_volume_.push_back(settings.rest_volume_um3);
-  }
 }
 
 /// Whether this step is the last, or the first at or after a multiple of `every_us`.
@@ -128,12 +152,13 @@ void FlowOutput::after_step(bool start) {
 }
 
 void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
+  const Membranes& membranes = *simulation_.membranes();
   for (std::size_t c = 0; c < cells.size(); ++c) {
-    totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / first_volume_[c] - 1));
-    const CellSettings& settings = scene_.cells[c];
+    totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / cells[c].rest_volume_um3 - 1));
+    const int cell = static_cast<int>(c), number = membranes.number(cell);
     // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
-    if (settings.law != CellSettings::Law::wlc_pow && settings.area_modulus_uN_per_m == 0) continue;
-    const double drift = std::abs(cells[c].area_um2 / first_area_[c] - 1);
+    if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
+    const double drift = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
     totals_.area_drift = larger(totals_.area_drift, drift);
     if (!(drift <= senseless_area))
       throw ComputationError(fmt::format(
@@ -142,27 +167,45 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
           "tell (grid.nodes); reduce the flow "
           "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
           "{}",
-          c, 100 * drift, 100 * lysis_area,
-          settings.type < 0 ? fmt::format("cells.{}.area_modulus_uN_per_m", c)
-                            : constant_key(settings, "area_modulus_uN_per_m")));
+          number, 100 * drift, 100 * lysis_area,
+          few_cells_ && scene_.cells[number].type >= 0 ? constant_key(scene_.cells[number], "area_modulus_uN_per_m")
+          : few_cells_                                 ? fmt::format("cells.{}.area_modulus_uN_per_m", number)
+                                                       : "its area_modulus_uN_per_m"));
   }
+}
+
+/// What one rank finds wrong with its cells is all ranks'.
+void FlowOutput::watch_shared_cells(const std::vector<CellDiagnostics>& cells) {
+  const Comm& comm = simulation_.grid().comm();
+  std::string failure;
+  try {
+    watch_cells(cells);
+  } catch (const ComputationError& error) {
+    failure = error.what();
+  }
+  failure = agree(comm, failure);
+  double drifts[2] = {totals_.volume_drift, totals_.area_drift};
+  comm.max(drifts, 2);
+  totals_.volume_drift = drifts[0], totals_.area_drift = drifts[1];
+  if (!failure.empty()) throw ComputationError(failure);
 }
 
 /// @param travelled  by how much the cell has been moved back through periodic sides, um
 HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const {
   HistorySample sample;
   sample.time_us = simulation_.time();
-  sample.cell = cell;
+  sample.cell = simulation_.membranes()->number(cell);
   sample.centroid_um = {d.centroid_um[0] + travelled[0], d.centroid_um[1] + travelled[1], d.centroid_um[2] + travelled[2]};
   sample.velocity_um_per_us = d.velocity_um_per_us;
   sample.extent_um = d.extent_um();
   sample.area_um2 = d.area_um2;
   sample.volume_um3 = d.volume_um3;
   sample.elastic_energy_fJ = d.energy_fJ();
+  if (!few_cells_) return sample;
   const auto& v = d.velocity_um_per_us;
   const bool moving = std::hypot(v[0], v[1], v[2]) > 1e-9;
   const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
-                                        moving ? v : scene_.cells[cell].axis);
+                                        moving ? v : scene_.cells[sample.cell].axis);
   sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};
   return sample;
 }
@@ -176,17 +219,56 @@ void FlowOutput::measure() {
   last_.clear();
   if (auto* membranes = simulation_.membranes()) {
     const auto cells = membranes->diagnostics();
-    watch_cells(cells);
+    if (simulation_.shared_cells())
+      watch_shared_cells(cells);
+    else
+      watch_cells(cells);
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
     const auto travelled = simulation_.coupling()->wrapped_by();
-    for (int c = 0; c < simulation_.cells(); ++c) {
-      auto sample = cell_sample(c, cells[c], travelled[c]);
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      auto sample = cell_sample(static_cast<int>(c), cells[c], travelled[c]);
       if (simulation_.rigid_bodies()) sample.more.resize(shape_columns.size() + balance_columns.size(), std::nan(""));
       last_.push_back(sample);
     }
+    if (simulation_.shared_cells()) gather_samples();
   }
   if (simulation_.rigid_bodies()) measure_bodies();
+}
+
+/// Every rank's samples to all, if cells are few, and else their mean.
+void FlowOutput::gather_samples() {
+  const Comm& comm = simulation_.grid().comm();
+  elastic_energy_ = comm.sum(elastic_energy_);
+  constexpr std::size_t width = 12;
+  const std::size_t more = few_cells_ ? shape_columns.size() : 0, rows = few_cells_ ? simulation_.cells() : 1;
+  std::vector<double> table(rows * (width + more), 0.0);
+  for (const auto& sample : last_) {
+    double* row = table.data() + (few_cells_ ? sample.cell * (width + more) : 0);
+    for (int d = 0; d < 3; ++d) {
+      row[d] += (*sample.centroid_um)[d];
+      row[3 + d] += (*sample.velocity_um_per_us)[d];
+      row[6 + d] += (*sample.extent_um)[d];
+    }
+    row[9] += *sample.area_um2, row[10] += *sample.volume_um3, row[11] += *sample.elastic_energy_fJ;
+    for (std::size_t n = 0; n < more; ++n) row[width + n] += sample.more[n];
+  }
+  comm.sum(table.data(), static_cast<int>(table.size()));
+  last_.clear();
+  for (std::size_t n = 0; n < rows; ++n) {
+    double* row = table.data() + n * (width + more);
+    if (!few_cells_)
+      for (std::size_t k = 0; k < width; ++k) row[k] /= simulation_.cells();
+    HistorySample sample;
+    sample.time_us = simulation_.time();
+    sample.cell = few_cells_ ? static_cast<int>(n) : -1;
+    sample.centroid_um = {row[0], row[1], row[2]};
+    sample.velocity_um_per_us = {row[3], row[4], row[5]};
+    sample.extent_um = {row[6], row[7], row[8]};
+    sample.area_um2 = row[9], sample.volume_um3 = row[10], sample.elastic_energy_fJ = row[11];
+    sample.more.assign(row + width, row + width + more);
+    last_.push_back(sample);
+  }
 }
 
 void FlowOutput::measure_bodies() {
@@ -243,11 +325,37 @@ void FlowOutput::write_cells() {
   if (simulation_.steps() > 0) simulation_.coupling()->tractions_for_output();  // for traction_fallbacks as well
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;
+  if (simulation_.shared_cells()) return write_shared_cells();
   const auto& set = *simulation_.surfaces();
   const auto x = vertex_values(set.vertices, set.x), v = vertex_values(set.vertices, set.v);
   const auto traction = vertex_values(set.vertices, simulation_.coupling()->tractions_for_output());
   cells_->write(simulation_.time(), simulation_.steps(), x.data(),
                 {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}});
+#endif
+}
+
+/// This rank's own, and of each what the history has of few.
+void FlowOutput::write_shared_cells() {
+#ifdef CORPUSCLE_HDF5
+  const SharedCells& shared = *simulation_.shared_cells();
+  const auto& set = shared.surfaces();
+  const auto x = vertex_values(set.own_vertices, set.x), v = vertex_values(set.own_vertices, set.v);
+  const auto traction = vertex_values(set.own_vertices, simulation_.coupling()->tractions_for_output());
+  const auto travelled = simulation_.coupling()->wrapped_by();
+  std::vector<double> centroid, velocity, extent, area, volume, energy;
+  const auto cells = simulation_.membranes()->diagnostics();
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const Triple size = cells[c].extent_um();
+    for (int d = 0; d < 3; ++d) centroid.push_back(cells[c].centroid_um[d] + travelled[c][d]);
+    velocity.insert(velocity.end(), cells[c].velocity_um_per_us.begin(), cells[c].velocity_um_per_us.end());
+    extent.insert(extent.end(), size.begin(), size.end());
+    area.push_back(cells[c].area_um2), volume.push_back(cells[c].volume_um3), energy.push_back(cells[c].energy_fJ());
+  }
+  cells_->write(simulation_.time(), simulation_.steps(), share_of(shared), x.data(),
+                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}},
+                {{"centroid_um", 3, centroid.data()}, {"velocity_um_per_us", 3, velocity.data()},
+                 {"extent_um", 3, extent.data()}, {"area_um2", 1, area.data()}, {"volume_um3", 1, volume.data()},
+                 {"elastic_energy_fJ", 1, energy.data()}});
 #endif
 }
 
@@ -271,6 +379,7 @@ void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& to
   totals_ = totals;
   energy_.resume(totals.energy);
   if (simulation_.immersed()) simulation_.immersed()->resume(totals.immersed);
+  if (simulation_.coupling()) simulation_.coupling()->resume_contact(totals.contact);
 }
 
 /// All that has been counted, of this run and those before it.
@@ -280,6 +389,8 @@ RunTotals FlowOutput::totals_now(bool together) {
   RunTotals now = totals_;
   now.energy = energy_.state();
   if (simulation_.immersed() && together) now.immersed = simulation_.immersed()->report();
+  if (simulation_.coupling())
+    if (const auto contact = simulation_.coupling()->contact_report()) now.contact = *contact;
   now.wall_s += largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
   for (const auto& [part, seconds] : timers_.seconds()) now.wall_s_by_part[part] += largest(seconds);
   return now;
@@ -296,6 +407,8 @@ void FlowOutput::fill_energy(Report& report) const {
   if (const auto own = energy_.coupling_imbalance()) report.errors["energy_balance_coupling"] = *own;
   terms["on_cells"] = t.on_cells;
   terms["elastic"] = t.elastic;
+  if (t.pushed != 0) terms["pushed"] = t.pushed;
+  if (scene_.contact) terms["contact"] = t.contact;
   terms["membrane_dissipation"] = t.membrane_dissipation;
   terms["membrane_kinetic"] = t.membrane_kinetic;
 }
@@ -304,6 +417,7 @@ void FlowOutput::fill_quantities(Report& report) const {
   auto& all = report.quantities;
   const char* axes[] = {"x", "y", "z"};
   for (const auto& sample : last_) {
+    if (sample.cell < 0) continue;
     const bool cell = sample.cell < simulation_.cells();
     const std::string of = fmt::format("{}_{}_", cell ? "cell" : "body", sample.cell);
     if (cell) {
@@ -347,6 +461,12 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
     if (search.least_wall_spacings < 1e30) errors["least_wall_spacings"] = search.least_wall_spacings;
     if (search.least_body_spacings < 1e30)
       errors["least_body_spacings"] = report.extra["immersed"]["least_body_spacings"] = search.least_body_spacings;
+  }
+  if (simulation_.coupling() && simulation_.coupling()->contact_report()) {
+    errors["crossings"] = now.contact.crossings;
+    report.extra["contact"] = {{"crossings", now.contact.crossings}, {"limited_approaches", now.contact.limited}, {"lists", now.contact.lists}};
+    report.extra["contact"]["smallest_gap_um"] =
+        now.contact.smallest_gap < 1e30 ? nlohmann::json(now.contact.smallest_gap) : nlohmann::json();
   }
   if (simulation_.membranes()) {
     errors["volume_drift"] = now.volume_drift;

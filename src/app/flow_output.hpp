@@ -26,6 +26,9 @@ class FlowOutput {
   /// a run warns at its end, beyond the second it is stopped.
   static constexpr double lysis_area = 0.04, senseless_area = 0.1;
 
+  /// Up to so many cells each has lines in the history; of more the history has the means, and cells.h5 what each does.
+  static constexpr int few_cells = 16;
+
   /// After every step (and before the first, with `start`): whatever is due.
   /// @throws ComputationError  when a file cannot be written, or a membrane has stretched far beyond what one can
   void after_step(bool start = false);
@@ -58,6 +61,9 @@ class FlowOutput {
   void judge_figures(Report& report) const;
   HistorySample cell_sample(int cell, const CellDiagnostics& d, const Triple& travelled) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
+  void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
+  void gather_samples();
+  void write_shared_cells();
 
   std::string folder_, run_, files_;
   Case scene_;
@@ -70,7 +76,7 @@ class FlowOutput {
   std::unique_ptr<CellWriter> cells_;
 #endif
   std::string last_checkpoint_;
-  std::vector<double> first_area_, first_volume_;
+  bool few_cells_ = true;  // each has lines of its own in the history
   RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
   std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
   std::chrono::steady_clock::time_point start_;

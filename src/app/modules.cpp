@@ -53,6 +53,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   add("transfer of forces", force);
   add("viscosity ratio", std::any_of(scene.cells.begin(), scene.cells.end(),
                                      [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
+  add("contact", force && scene.contact);
   add("rigid bodies", bodies);
   add("membrane", cells);
   add("membrane viscosity", viscous);

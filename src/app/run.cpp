@@ -213,12 +213,12 @@ void check_case(const Comm& comm, const RunOptions& options) {
   const auto& index = simulation.grid().index();
   const double nodes = static_cast<double>(index.global[0]) * index.global[1] * index.global[2];
   info("unknowns: {:.0f} grid cells x (3 velocities + pressure), {} surface vertices", nodes,
-       simulation.surfaces() ? simulation.surfaces()->vertices : 0);
+       simulation.coupling() ? simulation.coupling()->vertices() : 0);
   print_schedule(simulation.schedule());
   RunSize size;
   size.cells = nodes;
   size.skewed = !simulation.grid().orthogonal();
-  size.vertices = simulation.surfaces() ? simulation.surfaces()->vertices : 0;
+  size.vertices = simulation.coupling() ? static_cast<double>(simulation.coupling()->vertices()) : 0;
   size.steps = static_cast<double>(simulation.steps_left());
   size.cores = static_cast<double>(comm.size()) * thread_count();
   const std::string stability = simulation.coupling() ? simulation.coupling()->stability_text(simulation.next_step_us()) : "";

@@ -21,6 +21,7 @@ struct RunTotals {
   double speed = 0;                                                    // um/us, the largest at a node so far
   double slip_speed = 0;                                               // um/us, the largest of the sampled steps
   ImmersedReport immersed;
+  ContactReport contact;
   EnergyBalance::State energy;
   double wall_s = 0;                             // of the runs before this one, and of each part
   std::map<std::string, double> wall_s_by_part;

@@ -1,6 +1,7 @@
 // How bodies and the flow around them advance together: one interface for every way there is.
 #pragma once
 
+#include "contact/contact_report.hpp"
 #include "coupling/immersed_flow.hpp"
 #include "coupling/rigid_bodies.hpp"
 #include "coupling/step_schedule.hpp"
@@ -26,6 +27,8 @@ struct StepStatistics {
   int coupling_iterations = 0, substeps = 0;
   double coupling_residual = 0;  // change of the interface velocity that one more iteration would make, relative
 };
+
+class SharedCells;
 
 class Coupling {
  public:
@@ -63,16 +66,30 @@ class Coupling {
   /// Entries for the report's "stability".
   virtual std::map<std::string, double> report(double) const { return {}; }
 
-  /// How far each body has been moved back by whole periods since the start, um; copies to the host.
+  /// How far each body has been moved back by whole periods since the start, um, of cells those of membranes(); copies to the host.
   virtual std::vector<Triple> wrapped_by() const = 0;
   /// Of the fluid on the cells, nW, where no tractions tell.
   virtual double power_on_cells() { return 0; }
   /// Friction beside the membranes that the grid does not show, nW.
   virtual double unresolved_dissipation() { return 0; }
 
+  /// Of forces on the cells from outside, nW, and what the contacts between them have stored after a step of that length, fJ.
+  virtual double power_of_pushes() { return 0; }
+  virtual double contact_energy(double) { return 0; }
+  /// How contacts went; nothing without [contact].
+  virtual std::optional<ContactReport> contact_report() const { return std::nullopt; }
+  virtual void resume_contact(const ContactReport&) {}
+
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.
   virtual Membranes* membranes() { return nullptr; }
+  /// Where every rank has its own; null where all ranks have all cells.
+  virtual SharedCells* shared_cells() { return nullptr; }
+  /// A checkpoint's cells are in shared_cells().
+  virtual void cells_restored() {}
+  /// Of the whole scene.
+  virtual int cells() { return membranes() ? membranes()->cells() : 0; }
+  virtual long vertices() { return surfaces().vertices; }
   virtual RigidBodies* rigid_bodies() { return nullptr; }
   /// The search and the flow at surfaces that cut the grid; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }

@@ -14,7 +14,7 @@ namespace {
 /// The largest term of the whole balance: what imbalances are measured against.
 double largest_term(const EnergyTotals& t) {
   double largest = 0;
-  for (double term : {t.boundaries, t.gradient, t.dissipation, t.kinetic, t.on_bodies, t.elastic})
+  for (double term : {t.boundaries, t.gradient, t.dissipation, t.kinetic, t.on_bodies, t.pushed, t.elastic})
     largest = larger(largest, std::abs(term));
   return largest;
 }
@@ -51,10 +51,13 @@ void EnergyBalance::sample(double elastic_fJ) {
   } else if (surfaces) {
     now.on_cells = simulation_.coupling()->power_on_cells();
     now.dissipation += simulation_.coupling()->unresolved_dissipation();
+    now.pushed = simulation_.coupling()->power_of_pushes();
+    now.contact = simulation_.coupling()->contact_energy(simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us());
   }
   if (auto* membranes = simulation_.membranes()) {
     now.elastic = elastic_fJ;
     now.membrane_dissipation = membranes->dissipation_nW();
+    if (simulation_.shared_cells()) now.membrane_dissipation = simulation_.grid().comm().sum(now.membrane_dissipation);
     if (cut) now.membrane_kinetic = membranes->kinetic_energy_fJ();
   }
   if (state_.samples == 0) {
@@ -62,9 +65,9 @@ void EnergyBalance::sample(double elastic_fJ) {
   } else {
     const double half = 0.5 * (simulation_.time() - state_.time);
     for (auto rate : {&EnergyTotals::boundaries, &EnergyTotals::gradient, &EnergyTotals::dissipation,
-                      &EnergyTotals::on_cells, &EnergyTotals::on_bodies, &EnergyTotals::membrane_dissipation})
+                      &EnergyTotals::on_cells, &EnergyTotals::on_bodies, &EnergyTotals::pushed, &EnergyTotals::membrane_dissipation})
       state_.totals.*rate += half * (state_.rates.*rate + now.*rate);
-    for (auto content : {&EnergyTotals::kinetic, &EnergyTotals::elastic, &EnergyTotals::membrane_kinetic})
+    for (auto content : {&EnergyTotals::kinetic, &EnergyTotals::elastic, &EnergyTotals::contact, &EnergyTotals::membrane_kinetic})
       state_.totals.*content = now.*content - state_.first.*content;
   }
   state_.rates = now;
@@ -76,8 +79,8 @@ double EnergyBalance::largest_fJ() const { return largest_term(state_.totals); }
 
 std::optional<double> EnergyBalance::imbalance() const {
   const EnergyTotals& t = state_.totals;
-  const double in = t.boundaries + t.gradient;
-  return share(in - t.dissipation - t.kinetic - t.on_bodies - kept_by_membranes(t), largest_term(t));
+  const double in = t.boundaries + t.gradient + t.pushed;
+  return share(in - t.dissipation - t.kinetic - t.on_bodies - t.contact - kept_by_membranes(t), largest_term(t));
 }
 
 std::optional<double> EnergyBalance::coupling_imbalance() const {

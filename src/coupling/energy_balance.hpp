@@ -16,7 +16,9 @@ struct EnergyTotals {
   double kinetic = 0;                // change of the fluid's
   double on_cells = 0;               // by tractions
   double on_bodies = 0;              // by tractions, on those that move as prescribed
+  double pushed = 0;                 // on the cells by forces from outside
   double elastic = 0;                // change of the membranes'
+  double contact = 0;                // change of that of contacts
   double membrane_dissipation = 0;
   double membrane_kinetic = 0;       // change
 };

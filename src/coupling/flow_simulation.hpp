@@ -38,7 +38,10 @@ class FlowSimulation {
   /// Whether a cell has come so near to an outflow that the run should end, and a text that says which, where and when.
   bool at_outflow() const { return coupling_ && coupling_->at_outflow(next_step_us()); }
   std::string outflow_message() const;
-  int cells() { return membranes() ? membranes()->cells() : 0; }
+  /// Of the whole scene.
+  int cells() { return coupling_ ? coupling_->cells() : 0; }
+  /// Null where all ranks have all cells.
+  SharedCells* shared_cells() { return coupling_ ? coupling_->shared_cells() : nullptr; }
 
   /// State beyond that of fluid, bodies and coupling, for checkpoints.
   struct Progress {

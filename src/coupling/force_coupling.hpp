@@ -1,8 +1,9 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere, and move with it.
 #pragma once
 
+#include "cells/shared_cells.hpp"
+#include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
-#include "immersed/wrap.hpp"
 #include "transfer/cytosol.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
@@ -26,27 +27,40 @@ class ForceCoupling : public Coupling {
   std::map<std::string, double> report(double dt_us) const override;
   double power_on_cells() override;
   double unresolved_dissipation() override;
+  double power_of_pushes() override { return loads_ ? loads_->power_of_pushes() : 0; }
+  double contact_energy(double dt_us) override { return loads_ ? loads_->contact_energy(dt_us) : 0; }
+  std::optional<ContactReport> contact_report() const override { return loads_ ? loads_->report() : std::nullopt; }
+  void resume_contact(const ContactReport& report) override {
+    if (loads_) loads_->resume(report);
+  }
 
-  /// Periods taken off each cell since the start, and the force on the fluid in the last step.
-  std::vector<double> state() const override;
-  void set_state(const std::vector<double>& state) override;
+  void cells_restored() override;
+  void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
-  const SurfaceSet& surfaces() const override { return membranes_->surfaces(); }
-  Membranes* membranes() override { return membranes_.get(); }
+  const SurfaceSet& surfaces() const override { return cells_->surfaces(); }
+  Membranes* membranes() override { return membranes_; }
+  SharedCells* shared_cells() override { return cells_.get(); }
+  int cells() override { return cells_->total(); }
+  long vertices() override { return cells_->total_vertices(); }
 
  private:
   void place(double time_us);
   void fill_cells(double time_us);
-  void wrap();
-  void collect();
+  void take_up();
+  void watch_outflow();
+  template <class Work>
+  void together(const Work& work) const;
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
   double resisting_share() const;
   void find_softest();
   double anticipated_reaction(double dt) const;
-  /// On the fluid, in the last step.
-  const Components<double>& forces() const { return membranes_->views().force; }
+  /// The sum of all forces at the last gathering of loads.
+  const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;
+  void begin_step(double time_us, double dt_us, double ahead_us);
+  void update_copies();
+  void after_move(double time_us, double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
 
@@ -54,15 +68,14 @@ class ForceCoupling : public Coupling {
   FluidSolver& fluid_;
   Timers& timers_;
   std::vector<double> lengths_us_;  // of all steps there will be
-  std::unique_ptr<Membranes> membranes_;
+  std::shared_ptr<Workspace> workspace_;
+  std::unique_ptr<SharedCells> cells_;
+  Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
+  Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
-  Components<double> traction_;                 // [vertex, 3] kPa
-  Array<double> slip_share_;                    // [vertex] empty: 1
-  HostCopy<Components<double>> velocity_host_;  // only on several ranks
-  PeriodicFrame frame_;
+  std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   double quiet_speed_;        // um/us: what counts as rest
-  Table<int> laps_;           // [cell, 3] only in periodic domains
   std::string coarse_;        // which cells the grid resolves coarsely
   /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.
   struct Softest {

@@ -23,6 +23,10 @@ ImmersedFlow::ImmersedFlow(FluidSolver& fluid, const SurfaceSet& surfaces, const
     Grid* grid = &fluid.grid();
     options.sum = [grid](long value) { return grid->comm().sum(value); };
     options.exchange = [grid](const Array<std::int8_t>& field) { grid->halo().exchange(field); };
+    options.exchange_band = [grid](const BandViews& band) {
+      grid->halo().exchange(band.key);
+      grid->halo().exchange(band.cut);
+    };
   }
   options.outflow = leaving.sides;
   if (fluid.boundaries().has_outflow()) options.pressure_given = fluid.boundaries().outflow();
@@ -87,7 +91,7 @@ void ImmersedFlow::check_positions(double smallest_gap) {
         "gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
         "them.{} Move or tilt the cell (center_um, axis), refine the grid (grid.nodes) or use a {}",
         wall ? "the wall" : "a side", boundary_->describe_vertex(vertex), to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)),
-        smallest_gap, wall ? "film" : "flow", wall ? " Contact forces do not exist yet." : "", wall ? "wider channel" : "larger grid"));
+        smallest_gap, wall ? "film" : "flow", wall ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "", wall ? "wider channel" : "larger grid"));
   }
   check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
 }
@@ -98,49 +102,51 @@ void ImmersedFlow::check_clearance(int crossed, double between, double smallest_
   const auto& counts = boundary_->counts();
   if (crossed > 0) {
     const bool here = counts.crossed_links == crossed;
-    const auto [where, first, second] = describe_bodies(here ? counts.crossed_node : -1);
-    if (second.empty() && report_.classifications == 1)
+    const auto [where, first, second, inside] = describe_bodies(here ? counts.crossed_node : -1);
+    const bool alone = second.empty() || between >= smallest_gap;
+    if (alone && report_.classifications == 1)
       throw ComputationError(fmt::format(
           "surfaces cross: {} passes through itself near {}, as it is given, or folds there more tightly than the grid can tell: repair "
           "its surface file, use more vertices, or refine the grid (grid.nodes)",
-          first, where));
-    if (second.empty())
+          inside, where));
+    if (alone)
       throw ComputationError(fmt::format(
           "surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "
-          "or a step too long (time.step_us): contact forces do not exist yet",
-          first, where));
+          "or a step too long (time.step_us)",
+          inside, where));
     throw ComputationError(fmt::format(
-        "surfaces cross: {} and {} overlap near {}. Contact forces do not exist yet: move them apart (center_um, axis) or "
-        "end the run before they meet (time.end_us)",
+        "surfaces cross: {} and {} overlap near {}. Contact forces are only between membranes that are forces (coupling.scheme = "
+        "\"force\", [contact]): move them apart (center_um, axis) or end the run before they meet (time.end_us)",
         first, second, where));
   }
   if (between < smallest_gap) {
     const bool here = counts.body_spacings == between;
-    const auto [where, first, second] = describe_bodies(here ? counts.gap_node : -1);
+    const auto [where, first, second, inside] = describe_bodies(here ? counts.gap_node : -1);
     throw ComputationError(fmt::format(
         "gap between bodies: {} and {} are {:.2f} grid spacings apart, or overlap, near {}, and {:.2f} are needed to resolve the film "
-        "between them. Contact forces do not exist yet: move them apart (center_um, axis), refine the grid (grid.nodes) or "
-        "end the run before they meet (time.end_us)",
+        "between them. Contact forces are only between membranes that are forces (coupling.scheme = \"force\", [contact]): move them "
+        "apart (center_um, axis), refine the grid (grid.nodes) or end the run before they meet (time.end_us)",
         first, second.empty() ? "its image beyond a periodic boundary" : second, between, where, smallest_gap));
   }
 }
 
-/// Where a node is, and the names of the bodies beside it, the second empty if there is none. On all ranks; from the
-/// highest rank whose node is not -1. Copies to the host: for error messages.
-std::array<std::string, 3> ImmersedFlow::describe_bodies(int node) {
+/// Where a node is, and the names of the bodies beside it, the second empty if there is none, and of the one that a neighbour
+/// of it lies in. On all ranks; from the highest rank whose node is not -1. Copies to the host: for error messages.
+std::array<std::string, 4> ImmersedFlow::describe_bodies(int node) {
   const Comm& comm = fluid_.grid().comm();
   const double speaker = comm.max(node >= 0 ? static_cast<double>(comm.rank()) : -1.0);
-  double said[5] = {-1e300, -1e300, -1e300, -1e300, -1e300};
+  double said[6] = {-1e300, -1e300, -1e300, -1e300, -1e300, -1e300};
   if (comm.rank() == static_cast<int>(speaker)) {
     const NearBodies near = boundary_->bodies_near(node);
     for (int d = 0; d < 3; ++d) said[d] = near.at[d];
     said[3] = near.other < 0 ? near.body : std::min(near.body, near.other);
     said[4] = near.other < 0 ? -1 : std::max(near.body, near.other);
+    said[5] = near.around < 0 ? near.body : near.around;
   }
-  comm.max(said, 5);
+  comm.max(said, 6);
   const int first = static_cast<int>(said[3]), second = static_cast<int>(said[4]);
   return {fmt::format("({:.4g}, {:.4g}, {:.4g}) um", said[0], said[1], said[2]), body_name(surfaces_, first),
-          second < 0 ? "" : body_name(surfaces_, second)};
+          second < 0 ? "" : body_name(surfaces_, second), body_name(surfaces_, static_cast<int>(said[5]))};
 }
 
 void ImmersedFlow::check_resolution() {
@@ -242,8 +248,13 @@ const SurfaceStress& ImmersedFlow::tractions() {
     comm.sum(own.data(), static_cast<int>(own.span()));
     found_host_.write();
   }
-  complete_stress(surfaces_, boundary_->found_stress(), stress_, traction_);
+  unseen_vertex_ = complete_stress(surfaces_, boundary_->found_stress(), stress_, traction_);
   return stress_;
+}
+
+void ImmersedFlow::forget_tractions() {
+  Kokkos::deep_copy(stress_.values, 0.0);
+  Kokkos::deep_copy(traction_, 0.0);
 }
 
 std::vector<std::array<Triple, 2>> ImmersedFlow::loads(const std::vector<Triple>& centre) {

@@ -46,6 +46,13 @@ class ImmersedFlow {
   void solve(double time_us);
   /// Stress of the fluid at every vertex, the same on all ranks.
   const SurfaceStress& tractions();
+  /// Lowest vertex in a film without fluid nodes, to a second body, at the last tractions; no_vertex for none. Its pressure,
+  /// and those of all its neighbours, are not known. The same on all ranks.
+  int unseen_vertex() const { return unseen_vertex_; }
+  std::string vertex_text(int vertex) const { return boundary_->describe_vertex(vertex); }
+
+  /// As before the first step: tractions() only to see whether it can tell them leaves none.
+  void forget_tractions();
 
   /// The last of these, zero before the first, and as tractions -p n + viscous part, [vertex, 3] kPa.
   const SurfaceStress& last_stress() const { return stress_; }
@@ -88,7 +95,7 @@ class ImmersedFlow {
   int first_unowned_vertex();
   void check_positions(double smallest_gap);
   void check_clearance(int crossed, double between, double smallest_gap);
-  std::array<std::string, 3> describe_bodies(int node);
+  std::array<std::string, 4> describe_bodies(int node);
   void check_resolution();
 
   FluidSolver& fluid_;
@@ -103,6 +110,7 @@ class ImmersedFlow {
   Components<double> x_classified_;  // [vertex, 3] um, at the last classification
   double outflow_um_ = 1e30;  // of all ranks
   int outflow_vertex_ = -1;   // if it is this rank that sees it
+  int unseen_vertex_ = no_vertex;
   ImmersedReport report_;
   bool any_uncovered_ = false;  // on any rank, at the last classification
   long own_velocity_fallbacks_ = 0;  // of this rank, not yet in report_

@@ -60,11 +60,24 @@ void MembraneCoupling::check_start() {
                                                               std::pow(radius, 3) / area);
   }
   try {
+    load();
+    immersed_->forget_tractions();
     membranes_->stable_step_us();
     membranes_->substeps(scene_.time.step_us, stability(scene_.time.step_us)->beta);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
+}
+
+const SurfaceStress& MembraneCoupling::load() {
+  const auto& stress = immersed_->tractions();
+  if (const int vertex = immersed_->unseen_vertex(); vertex < membranes_->vertices())
+    throw ComputationError(
+        fmt::format("film between bodies: {} and its neighbours have another body so near that the grid has no fluid node between "
+                    "them: its pressure is not known. Refine the grid (grid.nodes), move them apart (center_um, axis), or use "
+                    "coupling.scheme = \"force\", with fluid everywhere",
+                    immersed_->vertex_text(vertex)));
+  return stress;
 }
 
 /// A cell may start nearer to an outflow than it may come to it later: it then stops half way.
@@ -191,7 +204,7 @@ StepStatistics StaggeredCoupling::advance(double time, double dt) {
   place_bodies(time, dt);
   copy_vertices(n, surfaces_->v, v_interface_);
   immersed_->solve(time + dt);
-  const auto& stress = immersed_->tractions();
+  const auto& stress = load();
   const auto scope = timers_.scope("membrane");
   copy_vertices(n, x_start_, surfaces_->x);
   StepStatistics statistics;
@@ -238,7 +251,7 @@ StepStatistics IteratedCoupling::advance(double time, double dt) {
     copy_vertices(n, v_interface_, surfaces_->v);
     copy_vertices(n, x_predicted_, surfaces_->x);
     immersed_->solve(time + dt);
-    const auto& stress = immersed_->tractions();
+    const auto& stress = load();
     const auto scope = timers_.scope("membrane");
     membranes_->restore_state();
     statistics.substeps = membranes_->advance(dt, stress, beta_, v_interface_);

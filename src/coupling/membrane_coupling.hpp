@@ -22,6 +22,9 @@ class MembraneCoupling : public SharpCoupling {
   double default_beta(double dt_us) const;
   void check_beta(double dt_us) const;
   void place_bodies(double time, double dt);
+  /// The fluid's stress on the membranes.
+  /// @throws ComputationError  if a part of one is in a film that has no fluid nodes
+  const SurfaceStress& load();
 
   Components<double> x_start_, v_interface_, residual_, previous_residual_;
   double beta_ = 0;         // Robin coefficient of the present step

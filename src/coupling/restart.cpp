@@ -2,6 +2,7 @@
 
 #ifdef CORPUSCLE_HDF5
 
+#include "cells/cell_state.hpp"
 #include "core/error.hpp"
 #include "output/checkpoint.hpp"
 #include "output/owned_values.hpp"
@@ -108,7 +109,9 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const auto coupling = simulation.coupling()->state();
     if (!coupling.empty()) file.add("coupling", {coupling.size()}, coupling.data());
   }
-  if (simulation.membranes()) {
+  if (simulation.shared_cells()) {
+    write_cells(file, simulation.grid().comm(), *simulation.shared_cells());
+  } else if (simulation.membranes()) {
     const auto membranes = simulation.membranes()->state();
     file.add("membranes", {membranes.size()}, membranes.data());
   }
@@ -179,7 +182,10 @@ void read_coupling(const CheckpointReader& file, FlowSimulation& simulation, boo
     file.read("coupling", {coupling.size()}, coupling.data());
     simulation.coupling()->set_state(coupling);
   }
-  if (simulation.membranes()) {
+  if (simulation.shared_cells()) {
+    read_cells(file, simulation.grid().comm(), *simulation.shared_cells());
+    simulation.coupling()->cells_restored();
+  } else if (simulation.membranes()) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());
     simulation.membranes()->set_state(membranes);

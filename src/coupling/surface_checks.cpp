@@ -190,15 +190,14 @@ void check_outside(const HostSurfaces& s, int inner, int outer, const Triple& sh
   if (inside == 0) return;
   const int first = std::min(inner, outer), second = std::max(inner, outer);
   const std::string there = fmt::format("({:.4g}, {:.4g}, {:.4g}) um", where->x, where->y, where->z);
-  if (inner == outer)
+  if (body_name(s.set, inner) == body_name(s.set, outer))
     throw InputError(fmt::format("surfaces cross: {} and its image beyond a periodic side overlap near {}; use a longer period or "
                                  "a smaller body",
                                  body_name(s.set, inner), there));
   if (inside == looked)
     throw InputError(fmt::format("{} lies inside {}, near {}; a body is solid throughout: move them apart (center_um)",
                                  body_name(s.set, inner), body_name(s.set, outer), there));
-  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}. Contact forces do not exist yet: move them apart "
-                               "(center_um, axis)",
+  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}: move them apart (center_um, axis)",
                                body_name(s.set, first), body_name(s.set, second), there));
 }
 
@@ -223,10 +222,11 @@ std::vector<Triple> near_images(const Grid& grid, const HostSurfaces& s, int a, 
   return shifts;
 }
 
-void check_apart(const Grid& grid, const HostSurfaces& s) {
+/// @param shared  beyond periodic sides there are copies
+void check_apart(const Grid& grid, const HostSurfaces& s, bool shared) {
   for (int a = 0; a < s.set.bodies; ++a)
     for (int b = 0; b < s.set.bodies; ++b)
-      for (const Triple& shift : near_images(grid, s, a, b)) {
+      for (const Triple& shift : shared ? std::vector<Triple>{Triple{}} : near_images(grid, s, a, b)) {
         if (a == b && shift == Triple{}) continue;
         check_outside(s, a, b, shift);
       }
@@ -234,15 +234,24 @@ void check_apart(const Grid& grid, const HostSurfaces& s) {
 
 }  // namespace
 
-std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces) {
+std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces,
+                                           const std::vector<int>& types) {
+  const auto same = [&](int a, int b) {
+    return types.empty() ? same_type(scene.cells[a], scene.cells[b]) : types[a] == types[b];
+  };
+  const auto is_copy = [&](int body) { return body >= surfaces.own_cells && body < surfaces.cells; };
   constexpr int looked_at = 250;
   const HostSurfaces s(surfaces);
   std::vector<Resolution> results;
   std::vector<std::vector<double>> thickness(surfaces.bodies);
   for (int body = 0; body < surfaces.bodies; ++body) {
+    if (is_copy(body)) {
+      results.emplace_back();
+      continue;
+    }
     // Cells of one type are as thick as each other.
     int alike = 0;
-    while (alike < body && !(body < surfaces.cells && same_type(scene.cells[alike], scene.cells[body]))) ++alike;
+    while (alike < body && !(body < surfaces.cells && same(alike, body))) ++alike;
     const NodeSteps steps = map.near(s.lower[body], s.upper[body]);
     std::vector<Sample> samples;
     int number = 0;
@@ -261,13 +270,13 @@ std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& sc
   return results;
 }
 
-std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces) {
+std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces, const std::vector<int>& types) {
   const SpacingMap map(grid);
   const HostSurfaces s(surfaces);
   for (int body = 0; body < surfaces.bodies; ++body) check_size(map, scene, s, body);
-  check_apart(grid, s);
+  check_apart(grid, s, surfaces.own_cells < surfaces.cells || !types.empty());
   std::string warnings;
-  const auto resolutions = measure_resolution(map, scene, surfaces);
+  const auto resolutions = measure_resolution(map, scene, surfaces, types);
   for (int body = 0; body < surfaces.bodies; ++body) {
     const Limits& limits = body < surfaces.cells ? cell_limits : body_limits;
     const auto warning = check_resolution(body_name(surfaces, body), *scene.grid, resolutions[body], limits);

@@ -15,11 +15,14 @@ struct Resolution {
 };
 
 /// Resolution of each body at its present position, by a few hundred of its vertices.
-std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces);
+/// @param types  [own cell], or empty: as in the scene
+std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces,
+                                           const std::vector<int>& types = {});
 
-/// Warns of bodies that the grid resolves coarsely.
+/// Warns of bodies that the grid resolves coarsely. Where cells are shared out, each rank looks at its own and at what comes near
+/// its block.
 /// @returns what it warned of, for messages about a run that breaks down later; "" if nothing
 /// @throws InputError  for a body that is larger than the grid, not resolved by it, inside another or across it
-std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces);
+std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces, const std::vector<int>& types = {});
 
 }  // namespace corpuscle

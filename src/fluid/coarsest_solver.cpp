@@ -68,7 +68,7 @@ void BandCoarsest::solve(const MultigridLevel&, const Array<CycleReal>& b, const
 }
 
 AmgCoarsest::AmgCoarsest(MultigridHierarchy& hierarchy)
-    : system_(hierarchy.comm(), hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
+    : system_(hierarchy.levels().back().comm, hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
       amg_(system_) {
   const int rows = hierarchy.levels().back().views.index.owned();
   rhs_ = Array<double>("corpuscle::multigrid::coarse_rhs", rows);
@@ -88,7 +88,8 @@ void AmgCoarsest::solve(const MultigridLevel& level, const Array<CycleReal>& b, 
 }
 
 std::unique_ptr<CoarsestSolver> make_coarsest_solver(MultigridHierarchy& hierarchy) {
-  if (hierarchy.comm().size() == 1 && hierarchy.levels().back().views.index.owned() <= BandCoarsest::most_rows)
+  const auto& last = hierarchy.levels().back();
+  if (last.comm.size() == 1 && last.views.index.owned() <= MultigridHierarchy::most_direct)
     return std::make_unique<BandCoarsest>(hierarchy);
   return std::make_unique<AmgCoarsest>(hierarchy);
 }

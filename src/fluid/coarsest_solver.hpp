@@ -20,11 +20,9 @@ class CoarsestSolver {
   virtual void raise() {}
 };
 
-/// Direct, on one rank: it costs less than setting BoomerAMG up, which has to be done whenever bodies move, and a cycle of it.
+/// Direct, for a level of which each rank has the whole: it costs less than setting BoomerAMG up, which has to be done whenever bodies move, and a cycle of it.
 class BandCoarsest : public CoarsestSolver {
  public:
-  static constexpr int most_rows = 500;
-
   explicit BandCoarsest(MultigridHierarchy& hierarchy);
   void update(const MultigridLevel& level) override;
   void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
@@ -33,7 +31,7 @@ class BandCoarsest : public CoarsestSolver {
   BandSystem band_;
 };
 
-/// One cycle of BoomerAMG, for levels of many cells or on several ranks.
+/// One cycle of BoomerAMG, for levels of many cells.
 class AmgCoarsest : public CoarsestSolver {
  public:
   explicit AmgCoarsest(MultigridHierarchy& hierarchy);

@@ -62,7 +62,7 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
   momentum_ = std::make_unique<Momentum>(*hierarchy_, n);
   for (auto& level : momentum_->cycle.levels())
     for (int d = 0; d < 3; ++d)
-      for (int side = 0; side < 2; ++side) level.views.closed[d][side] = grid.halo().neighbour(d, side) < 0;
+      for (int side = 0; side < 2; ++side) level.views.closed[d][side] = !level.views.shared[d][side];
   pressure_cycle_ = std::make_unique<PressureCycle>(*hierarchy_);
   if (skewed_) {
     psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);

@@ -41,6 +41,7 @@ void MultigridCycle<Field>::update() {
     if (l + 1 == levels_.size()) break;
     if (level.views.split) halo.exchange(level.own);
     restrict_sums(level.views, levels_[l + 1].views.index, level.own, levels_[l + 1].own);
+    if (hierarchy_->levels()[l + 1].cells) hierarchy_->levels()[l + 1].cells->run(levels_[l + 1].own);
   }
 }
 
@@ -48,12 +49,12 @@ template <class Field>
 void MultigridCycle<Field>::smooth_down(std::size_t number) {
   Level& level = levels_[number];
   Halo& halo = hierarchy_->levels()[number].halo;
-  halo.exchange(level.b);
+  halo.exchange(level.b, 1);
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   const auto first = steps.next(), second = steps.next();
   smooth_from_zero(level.views, first, second, level.b, level.y, level.x);
   for (int n = 2; n < smoothing_.steps; ++n) {
-    halo.exchange(level.x);
+    halo.exchange(level.x, 1);
     smooth(level.views, steps.next(), level.b, level.x, level.y);
     std::swap(level.x, level.y);
   }
@@ -64,7 +65,7 @@ void MultigridCycle<Field>::smooth_up(std::size_t number) {
   Level& level = levels_[number];
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   for (int n = 0; n < smoothing_.steps; ++n) {
-    hierarchy_->levels()[number].halo.exchange(level.x);
+    hierarchy_->levels()[number].halo.exchange(level.x, 1);
     smooth(level.views, steps.next(), level.b, level.x, level.y);
     std::swap(level.x, level.y);
   }
@@ -79,12 +80,14 @@ void MultigridCycle<Field>::descend(std::size_t number, int depth) {
   if (!coarsest && depth > 0) {
     Halo& halo = hierarchy_->levels()[number].halo;
     Level& coarse = levels_[number + 1];
-    halo.exchange(level.x);
+    auto& shared = hierarchy_->levels()[number + 1];
+    halo.exchange(level.x, 1);
     level_residual(level.views, level.b, level.x, level.y);
-    if (level.views.split) halo.exchange(level.y);
+    if (level.views.split) halo.exchange(level.y, 1);
     restrict_sums(level.views, coarse.views.index, level.y, coarse.b);
+    if (shared.cells) shared.cells->run(coarse.b);
     descend(number + 1, depth - 1);
-    if (level.views.split) hierarchy_->levels()[number + 1].halo.exchange(coarse.x);
+    if (level.views.split) shared.halo.exchange(coarse.x, 1);
     add_correction(level.views, coarse.views.index, coarse.x, level.x);
   }
   smooth_up(number);

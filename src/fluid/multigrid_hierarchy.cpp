@@ -10,6 +10,7 @@ namespace {
 constexpr double strong = 0.4;
 constexpr int smallest_block = 2 * IndexSpace::halo;  // along a direction that is cut over ranks or periodic
 constexpr double coarsest_cells = 300;
+constexpr int gathered_cells = 4096;  // a message takes as long as smoothing about as many once
 
 MultigridLevel make_level(const IndexSpace& index) {
   MultigridLevel level;
@@ -21,19 +22,33 @@ MultigridLevel make_level(const IndexSpace& index) {
 }  // namespace
 
 MultigridHierarchy::MultigridHierarchy(Grid& grid, const Array<double> (&coefficient)[3]) : grid_(&grid) {
-  const IndexSpace& index = grid.index();
   for (int d = 0; d < 3; ++d) coefficient_[d] = coefficient[d];
-  levels_.push_back({make_level(index), Halo(grid.comm(), index, grid.ranks_per_direction()), 0});
-  const PressureMask everywhere("corpuscle::multigrid::mask", index.size());
+  build(coefficient, gathered_cells);
+  // A level that hypre solves is one for all ranks together, which end alike when that fails.
+  if (levels_.back().views.index.owned() > most_direct && levels_.back().comm.size() < grid.comm().size()) build(coefficient, 0);
+}
+
+void MultigridHierarchy::build(const Array<double> (&coefficient)[3], int most_gathered) {
+  levels_.clear();
+  add_level(grid_->index(), grid_->comm(), grid_->ranks_per_direction());
+  const PressureMask everywhere("corpuscle::multigrid::mask", grid_->index().size());
   Kokkos::deep_copy(everywhere, 1);
-  mask_conductances(coefficient_, everywhere, levels_[0].views);
-  while (add_coarser()) coarsen(levels_.size() - 1);
+  mask_conductances(coefficient, everywhere, levels_[0].views);
+  while (add_coarser(most_gathered)) coarsen(levels_.size() - 1);
+}
+
+void MultigridHierarchy::add_level(const IndexSpace& index, const Comm& comm, const std::array<int, 3>& ranks) {
+  Level level{make_level(index), comm, Halo(comm, index, ranks)};
+  for (int d = 0; d < 3; ++d)
+    for (int side = 0; side < 2; ++side) level.views.shared[d][side] = level.halo.neighbour(d, side) >= 0;
+  levels_.push_back(std::move(level));
 }
 
 /// Append the next level, unless the last one is small enough or cannot be coarsened where it should be.
-bool MultigridHierarchy::add_coarser() {
-  const Comm& comm = grid_->comm();
+bool MultigridHierarchy::add_coarser(int most_gathered) {
   Level& fine = levels_.back();
+  const Comm comm = fine.comm;
+  const auto& ranks = grid_->ranks_per_direction();
   IndexSpace index = fine.views.index;
   double strength[3], most = 0;
   for (int d = 0; d < 3; ++d) strength[d] = sum_conductances(fine.views, d);
@@ -42,11 +57,16 @@ bool MultigridHierarchy::add_coarser() {
   if (static_cast<double>(index.global[0]) * index.global[1] * index.global[2] <= coarsest_cells) return false;
   for (double s : strength) most = std::max(most, s);
   int factor[3] = {1, 1, 1};
+  double coarse_cells = 1;
   for (int d = 0; d < 3; ++d) {
-    if (strength[d] < strong * most) continue;
-    const bool cut = grid_->ranks_per_direction()[d] > 1 || index.periodic[d];
-    if (static_cast<int>(comm.min(index.n[d])) < (cut ? smallest_block : 2)) return false;
-    factor[d] = 2;
+    if (strength[d] >= strong * most) factor[d] = 2;
+    coarse_cells *= (index.global[d] + factor[d] - 1) / factor[d];
+  }
+  const bool gathered = comm.size() > 1 && coarse_cells <= most_gathered;
+  for (int d = 0; d < 3; ++d) {
+    const bool cut = (comm.size() > 1 && ranks[d] > 1 && !gathered) || index.periodic[d];
+    const int least = gathered ? index.global[d] : static_cast<int>(comm.min(index.n[d]));
+    if (factor[d] == 2 && least < (cut ? smallest_block : 2)) return false;
   }
   double split = 0;
   for (int d = 0; d < 3; ++d) {
@@ -59,18 +79,35 @@ bool MultigridHierarchy::add_coarser() {
     if (fine.views.shift[d] != 0) split = 1;
   }
   fine.views.split = comm.max(split) > 0;
-  levels_.push_back({make_level(index), Halo(comm, index, grid_->ranks_per_direction()), 0});
+  fine.views.part = index;
+  if (!gathered) {
+    add_level(index, comm, comm.size() > 1 ? ranks : std::array<int, 3>{1, 1, 1});
+    return true;
+  }
+  IndexSpace whole = index;
+  for (int d = 0; d < 3; ++d) {
+    fine.views.begin[d] = index.first[d];
+    whole.first[d] = 0, whole.n[d] = index.global[d];
+  }
+  add_level(whole, Comm::alone(), {1, 1, 1});
+  Level& coarse = levels_.back();
+  coarse.cells = std::make_unique<Gathering>(comm, index, whole, Gathering::of_cells);
+  for (int d = 0; d < 3; ++d) coarse.faces[d] = std::make_unique<Gathering>(comm, index, whole, d);
   return true;
 }
 
 void MultigridHierarchy::coarsen(std::size_t number) {
   Level& level = levels_[number];
   coarsen_conductances(levels_[number - 1].views, level.views);
-  for (auto& g : level.views.conductance) level.halo.exchange(g);
+  for (int d = 0; d < 3; ++d) {
+    if (level.faces[d]) level.faces[d]->run(level.views.conductance[d]);
+    level.halo.exchange(level.views.conductance[d]);
+  }
 }
 
 void MultigridHierarchy::update(const PressureMask& mask) {
-  mask_conductances(coefficient_, mask, levels_[0].views);
+  Level& finest = levels_[0];
+  mask_conductances(coefficient_, mask, finest.views);
   for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
 }
 

@@ -4,16 +4,25 @@
 
 #include "fluid/multigrid.hpp"
 #include "grid/grid.hpp"
+#include "parallel/gathering.hpp"
+
+#include <memory>
+#include <vector>
 
 namespace corpuscle {
 
+/// Fine levels are cut over ranks as the grid is. Of those with few cells every rank has the whole, and does the same work
+/// as all others: that takes less time than the messages that would share it out.
 class MultigridHierarchy {
  public:
   struct Level {
     MultigridLevel views;  // without diagonals, which the cycles' equations differ in
+    Comm comm;             // this rank alone, where it has the whole level
     Halo halo;
-    double strength;       // sum of all ranks' conductances, without bodies
+    double strength = 0;   // sum of all ranks' conductances, without bodies
+    std::unique_ptr<Gathering> cells{}, faces[3]{};  // where the level is the first of which each rank has the whole; else null
   };
+  static constexpr int most_direct = 500;  // cells of a coarsest level that is solved directly
 
   /// @param coefficient  [cell] of the normal difference, by direction (ViscousCoefficients::normal), valid in one halo
   ///                     layer
@@ -26,7 +35,9 @@ class MultigridHierarchy {
   const Comm& comm() const { return grid_->comm(); }
 
  private:
-  bool add_coarser();
+  void build(const Array<double> (&coefficient)[3], int most_gathered);
+  bool add_coarser(int most_gathered);
+  void add_level(const IndexSpace& index, const Comm& comm, const std::array<int, 3>& ranks);
   void coarsen(std::size_t number);
 
   Grid* grid_;

@@ -48,7 +48,7 @@ KrylovResult PressureMultigrid::solve(const Array<double>& rhs, const Array<doub
     const double next = comm_.sum(owned_dot(index, r_, finest.x)) / scale;
     new_direction(index, result.iterations == 0 ? 0.0 : next / rz, 1 / scale, finest.x, p_);
     rz = next;
-    halo_->exchange(p_);
+    halo_->exchange(p_, 1);
     const double alpha = rz / comm_.sum(apply_and_dot(operator_, p_, q_));
     scale = 1 / norm;
     norm = std::sqrt(comm_.sum(advance_and_norm(index, alpha, scale, p_, q_, x, r_, finest.b)));

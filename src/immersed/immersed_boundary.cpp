@@ -24,7 +24,7 @@ auto to_host(const View& view) {
   return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
 }
 
-/// All shifts by -1, 0 or +1 period; the identity first, so that it wins ties.
+/// All shifts by -1, 0 or +1 period, in the order that Images states; the identity first, so that it wins ties.
 Images make_images(const IndexSpace& index, const Vec3 (&period)[3]) {
   Images images;
   images.count = 0;
@@ -176,9 +176,7 @@ void ImmersedBoundary::classify() {
   clear_band(lattice_, box, band_);
   Kokkos::deep_copy(Exec(), previous_kind_, nodes_.kind);
   pseudo_normals(surface_, normals_);
-  mark_band(lattice_, surface_, images_, places_, band_);
-  mark_cut_links(lattice_, surface_, images_, places_, band_);
-  measure_band(lattice_, box, surface_, images_, normals_, band_);
+  mark_nodes(box);
   last_box_ = present;
   counted_box_ = box;
   classify_nodes(box);
@@ -188,6 +186,22 @@ void ImmersedBoundary::classify() {
     allocate_rows(counts_.immersed + counts_.immersed / 2);
     list_immersed(grid_.index, box, nodes_.kind, velocity_.node);
   }
+}
+
+/// Of the halo, what others have marked is taken over from them: it is as much as a rank's own where a cell lies across the
+/// plane between two.
+void ImmersedBoundary::mark_nodes(const NodeBox& box) {
+  NodeBox all, own;
+  std::copy(lattice_.lower, lattice_.lower + 3, all.lower);
+  std::copy(lattice_.upper, lattice_.upper + 3, all.upper);
+  own = options_.exchange_band ? marked_nodes(lattice_) : all;
+  mark_band(lattice_, own, surface_, images_, places_, band_);
+  mark_cut_links(lattice_, own.grown(1).clipped(all.lower, all.upper), surface_, images_, places_, band_);
+  if (options_.exchange_band) {
+    options_.exchange_band(band_);
+    if (periodic()) turn_images(lattice_, surface_.triangles, band_.key);
+  }
+  measure_band(lattice_, options_.exchange_band ? all : box, surface_, images_, normals_, band_);
 }
 
 void ImmersedBoundary::wrap(int first, int last, bool from_start) {
@@ -383,10 +397,15 @@ NearBodies ImmersedBoundary::bodies_near(int node) const {
   const auto key = to_host(band_.key);
   const auto triangle_body = to_host(surface_.triangle_body);
   const auto body = [&](int c) { return key_body(triangle_body, key(c)); };
-  NearBodies near{load(x, node), body(node), -1};
-  for (int side = 0; side < 6 && near.other < 0; ++side) {
+  const auto kind = to_host(nodes_.kind);
+  const auto cut = to_host(band_.cut);
+  NearBodies near{load(x, node), body(node)};
+  for (int side = 0; side < 6; ++side) {
     const int other = node + (side % 2 == 0 ? 1 : -1) * grid_.index.stride(side / 2);
-    if (key(other) != no_key && body(other) != near.body) near.other = body(other);
+    if (key(other) == no_key) continue;
+    if (near.other < 0 && body(other) != near.body) near.other = body(other);
+    const bool between = cut(side % 2 == 0 ? node : other) & (1 << side / 2);
+    if (near.around < 0 && !between && kind(other) == NodeKind::inside) near.around = body(other);
   }
   return near;
 }

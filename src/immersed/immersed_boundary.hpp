@@ -22,6 +22,7 @@ struct ImmersedOptions {
   /// sum over all ranks, and the exchange of halos.
   std::function<long(long)> sum;
   std::function<void(const Array<std::int8_t>&)> exchange;
+  std::function<void(const BandViews&)> exchange_band;  // keys and cut links
   std::array<bool, 6> outflow{}; // sides through which the first `travellers` vertices, those of cells, may leave
   int travellers = 0;
   Array<unsigned char> pressure_given;   // [cell] boundary nodes where the pressure is known, those of outflow sides; empty for none
@@ -52,6 +53,7 @@ struct ImmersedCounts {
 struct NearBodies {
   Vec3 at;                // um
   int body, other = -1;   // -1: no other
+  int around = -1;        // that a neighbour lies in with no triangle between; -1: none does
 };
 
 /// Owns the search band, the classification and the stencils of one rank's block. Communicates only through its options.
@@ -123,6 +125,7 @@ class ImmersedBoundary {
  private:
   StencilInput input() const { return {lattice_, surface_, images_, normals_, band_, nodes_, extended_}; }
   NodeBox read_places();
+  void mark_nodes(const NodeBox& box);
   void classify_nodes(const NodeBox& box);
   NodeBox resolve_enclosed(const NodeBox& box);
   void read_counts(const NodeBox& box);

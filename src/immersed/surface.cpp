@@ -8,12 +8,14 @@ namespace corpuscle {
 
 namespace {
 
-void allocate(SurfaceSet& set, const std::vector<TriangleMesh>& bodies) {
+void allocate(SurfaceSet& set, const std::vector<TriangleMesh>& bodies, int cells) {
   set.bodies = int(bodies.size());
+  set.cells = set.own_cells = cells;
   for (const TriangleMesh& mesh : bodies) {
     set.vertices += int(mesh.vertices.size());
     set.triangles += int(mesh.triangles.size());
   }
+  for (int c = 0; c < cells; ++c) set.own_vertices += int(bodies[c].vertices.size());
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::surface::") + name); };
   set.x = Components<double>(label("x_vertex"), set.vertices, 3);
   set.v = Components<double>("corpuscle::surface::v_vertex", set.vertices, 3);
@@ -27,7 +29,8 @@ void allocate(SurfaceSet& set, const std::vector<TriangleMesh>& bodies) {
   set.first_triangle = Array<int>(label("first_triangle"), set.bodies + 1);
   set.ring_start = Array<int>(label("ring_start"), set.vertices + 1);
   set.ring_triangle = Array<int>(label("ring_triangle"), 3 * set.triangles);
-  set.ring_corner = Array<int>(label("ring_corner"), 3 * set.triangles);
+  set.ring_corner = Array<std::int8_t>(label("ring_corner"), 3 * set.triangles);
+  set.number = Array<int>(label("number_body"), set.bodies);
 }
 
 /// Host images of a set's arrays, filled body by body and then copied to the device.
@@ -46,10 +49,13 @@ struct HostSet {
         first_triangle(mirror(set.first_triangle)),
         ring_start(mirror(set.ring_start)),
         ring_triangle(mirror(set.ring_triangle)),
-        ring_corner(mirror(set.ring_corner)) {}
+        ring_corner(mirror(set.ring_corner)),
+        number(mirror(set.number)),
+        cells(set.cells) {}
 
   void add(const TriangleMesh& mesh, int body) {
     const int v0 = vertices, t0 = triangles;
+    number(body) = body < cells ? body : body - cells;
     first_vertex(body) = v0;
     first_triangle(body) = t0;
     const auto neighbours = triangle_neighbours(mesh);
@@ -68,7 +74,7 @@ struct HostSet {
       for (int t : rings[i]) {
         const auto& c = mesh.triangles[t];
         ring_triangle(entries) = t0 + t;
-        ring_corner(entries++) = c[0] == int(i) ? 0 : (c[1] == int(i) ? 1 : 2);
+        ring_corner(entries++) = static_cast<std::int8_t>(c[0] == int(i) ? 0 : (c[1] == int(i) ? 1 : 2));
       }
     }
     ring_start(vertices) = entries;
@@ -87,21 +93,24 @@ struct HostSet {
     Kokkos::deep_copy(set.ring_start, ring_start);
     Kokkos::deep_copy(set.ring_triangle, ring_triangle);
     Kokkos::deep_copy(set.ring_corner, ring_corner);
+    Kokkos::deep_copy(set.number, number);
   }
 
   int vertices = 0, triangles = 0, entries = 0;
   HostMirror<Components<double>> x;
   HostMirror<Table<int>> triangle, neighbour;
-  HostMirror<Array<int>> vertex_body, triangle_body, first_vertex, first_triangle, ring_start, ring_triangle,
-      ring_corner;
+  HostMirror<Array<int>> vertex_body, triangle_body, first_vertex, first_triangle, ring_start, ring_triangle;
+  HostMirror<Array<std::int8_t>> ring_corner;
+  HostMirror<Array<int>> number;
+  int cells;
 };
 
 }  // namespace
 
-SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies) {
+SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies, int cells) {
   for (std::size_t b = 0; b < bodies.size(); ++b) check_closed_surface(bodies[b], fmt::format("of body {}", b));
   SurfaceSet set;
-  allocate(set, bodies);
+  allocate(set, bodies, cells);
   if (bodies.empty()) {
     Kokkos::deep_copy(set.first_vertex, 0);
     Kokkos::deep_copy(set.first_triangle, 0);
@@ -116,7 +125,8 @@ SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies) {
 }
 
 std::string body_name(const SurfaceSet& surfaces, int body) {
-  return body < surfaces.cells ? "cells." + std::to_string(body) : "bodies." + std::to_string(body - surfaces.cells);
+  const auto number = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.number);
+  return (body < surfaces.cells ? "cells." : "bodies.") + std::to_string(number(body));
 }
 
 TriangleMesh body_mesh(const SurfaceSet& surfaces, int body) {

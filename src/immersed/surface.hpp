@@ -10,8 +10,9 @@
 namespace corpuscle {
 
 /// All arrays allocated and filled: positions as given, velocities zero, normals and areas up to date.
+/// @param cells  how many of the first bodies are membranes, all of them this rank's own
 /// @throws InputError  if a mesh is not a closed surface
-SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies);
+SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies, int cells = 0);
 
 /// As the case file addresses it: "cells.0", "bodies.2".
 std::string body_name(const SurfaceSet& surfaces, int body);

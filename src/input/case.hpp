@@ -98,6 +98,7 @@ struct CellSettings {
   Triple axis{0, 0, 1};                 // direction of the cell's symmetry axis
   double spin_deg = 0;                  // rotation of the mesh about that axis
   Triple start_stretch{1, 1, 1};        // by which the cell starts drawn out along its own axes, with its volume kept
+  Triple push_nN{};                     // on the cell from outside, the same share on each vertex
   double mass_pg = 100;
   Law law = Law::wlc_pow;
   double skalak_c = 1;                  // skalak: modulus of area = shear modulus (1 + 2 C)
@@ -169,6 +170,16 @@ struct CouplingSettings {
   bool operator==(const CouplingSettings&) const = default;
 };
 
+/// [contact], between membranes that are forces
+struct ContactSettings {
+  double range_um = 0.25;
+  double pressure = 0.02;               // kPa, at half the range: 0.5 nN on 25 um2, about what presses red cells
+  double aggregation_energy = 0;        // fJ/um2
+  double aggregation_range_um = 0.5;
+
+  bool operator==(const ContactSettings&) const = default;
+};
+
 /// [stretching]: a cell pulled by two opposite forces, no fluid
 struct StretchingSettings {
   double force_pN = 200;
@@ -206,6 +217,7 @@ struct Case {
   std::vector<CellSettings> cells;
   std::vector<BodySettings> bodies;
   std::optional<CouplingSettings> coupling;
+  std::optional<ContactSettings> contact;
   std::optional<StretchingSettings> stretching;
   OutputSettings output;
 };

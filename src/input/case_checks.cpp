@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 
 namespace corpuscle {
 namespace {
@@ -56,6 +57,32 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
              "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
 }
 
+/// What pushes cells from outside must have something that holds them.
+void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
+  Triple sum{};
+  int first = -1;
+  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+    for (int d = 0; d < 3; ++d) {
+      if (scene.cells[c].push_nN[d] != 0 && first < 0) first = static_cast<int>(c);
+      sum[d] += scene.cells[c].push_nN[d];
+    }
+  if (first < 0) return;
+  const std::string cell = fmt::format("cells.{}", first);
+  if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force)
+    complain(cell, "push_nN", "only membranes that are forces (coupling.scheme = \"force\") can be pushed: leave it out, or use that scheme");
+  for (int side : entry_of) {
+    const auto type = scene.boundaries[side].type;
+    if (type != Type::periodic && type != Type::symmetry) return;
+  }
+  constexpr double rounding = 1e-9;  // nN
+  for (int d = 0; d < 3; ++d)
+    if (std::abs(sum[d]) > rounding)
+      complain(cell, "push_nN",
+               fmt::format("all pushes add up to [{:g}, {:g}, {:g}] nN, and with periodic or symmetry sides all round nothing holds the "
+                           "fluid: it would go ever faster; make them add up to zero, or give the grid a wall",
+                           sum[0], sum[1], sum[2]));
+}
+
 /// Whether each part of the gradient has periodic sides to drive fluid between, on grids whose index directions are x, y, z;
 /// on others their geometry decides, see check_pressure_gradient().
 void check_gradient(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
@@ -104,6 +131,7 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
     complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
 
   check_gradient(scene, entry_of, complain);
+  check_pushes(scene, entry_of, complain);
 }
 
 void check_modules(const Case& scene, const Complaint& complain) {
@@ -113,11 +141,15 @@ void check_modules(const Case& scene, const Complaint& complain) {
                                                              {scene.grid.has_value(), "grid"},
                                                              {!scene.boundaries.empty(), "boundary"},
                                                              {!scene.bodies.empty(), "bodies"},
-                                                             {scene.coupling.has_value(), "coupling"}})
+                                                             {scene.coupling.has_value(), "coupling"},
+                                                             {scene.contact.has_value(), "contact"}})
       if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
     if (scene.cells.size() != 1)
       complain("stretching", "",
                fmt::format("a stretching test pulls one cell; the case has {} [[cells]]", scene.cells.size()));
+    for (std::size_t c = 0; c < scene.cells.size(); ++c)
+      if (scene.cells[c].push_nN != Triple{})
+        complain(fmt::format("cells.{}", c), "push_nN", "a stretching test pulls with stretching.force_pN: leave this out");
     return;
   }
   if (!scene.fluid && !scene.bodies.empty()) complain("bodies", "", "rigid bodies need a [fluid]");
@@ -131,6 +163,10 @@ void check_modules(const Case& scene, const Complaint& complain) {
     check_force_scheme(scene, complain);
   else
     check_sharp_scheme(scene, complain);
+  if (scene.contact && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
+    complain("contact", "",
+             scene.cells.empty() ? "there are no [[cells]] to touch each other: leave this section out"
+                                 : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
   check_boundaries(scene, complain);
 }
 

@@ -33,7 +33,6 @@ class CaseReader {
     Case scene;
     scene.path = source_.file;
     read_title(scene);
-    if (root_.contains("contact")) complain("contact", "", "contact forces do not exist yet: leave this section out");
     if (root_.contains("grid")) scene.grid = one<GridSettings>("grid", read_grid);
     if (root_.contains("fluid")) scene.fluid = one<FluidSettings>("fluid", read_fluid);
     each("boundary", [&](Section& s) { scene.boundaries.push_back(read_boundary(s)); });
@@ -43,9 +42,13 @@ class CaseReader {
     each("bodies", [&](Section& s) { scene.bodies.push_back(read_body(s)); });
     const bool coupled = scene.fluid && !scene.cells.empty();
     if (root_.contains("coupling") || coupled) scene.coupling = one<CouplingSettings>("coupling", read_coupling);
+    if (root_.contains("contact")) scene.contact = one<ContactSettings>("contact", read_contact);
     if (root_.contains("stretching")) scene.stretching = one<StretchingSettings>("stretching", read_stretching);
     check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
-    if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) note_without_effect(scene);
+    if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) {
+      note_without_effect(scene);
+      note_without_contact(scene);
+    }
     read_time_section(scene);
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = !scene.cells.empty() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
@@ -127,6 +130,13 @@ class CaseReader {
       scene.remarks.push_back(fmt::format("{}{} has no effect with coupling.scheme = \"force\": {}", first,
                                           others > 0 ? fmt::format(" (and {} more)", others) : "", why));
     }
+  }
+
+  static void note_without_contact(Case& scene) {
+    if (scene.contact || scene.cells.size() < 2) return;
+    scene.remarks.push_back(
+        fmt::format("there are {} cells and no [contact]: nothing but the fluid keeps them apart, and that they cross would not be "
+                    "seen; add [contact]", scene.cells.size()));
   }
 
   template <class Settings, class Read>

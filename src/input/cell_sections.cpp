@@ -149,6 +149,7 @@ void read_place(Section& s, CellSettings& c, bool placed) {
   c.axis = read_axis(s);
   c.spin_deg = s.number("spin_deg", between(-360, 360), c.spin_deg);
   c.start_stretch = s.triple("start_stretch", between(0.5, 2), c.start_stretch);
+  c.push_nN = s.triple("push_nN", between(-most_nN, most_nN), Triple{});
 }
 
 std::vector<std::string> known_constants(const Section& s) {
@@ -191,7 +192,7 @@ CellTypeSettings read_cell_type(Section& s, const std::vector<CellTypeSettings>&
   if (s.has("name") && type.name.empty()) s.fail("name", "must not be empty: cells say type = \"name\"");
   for (const auto& other : known)
     if (other.name == type.name) s.fail("name", fmt::format("cell_types.{} has this name already", other.cell.type));
-  for (const char* key : {"center_um", "axis", "spin_deg", "start_stretch"})
+  for (const char* key : {"center_um", "axis", "spin_deg", "start_stretch", "push_nN"})
     s.unused(key, "a type has no place: give it in the [[cells]] entry of each cell");
   type.cell.type = static_cast<int>(known.size());
   read_constants(s, type.cell);

@@ -75,9 +75,14 @@ Read reader_of(const std::string& name) {
   if (name == "fluid") return read_fluid;
   if (name == "boundary") return read_boundary;
   if (name == "cell_types") return [](Section& s) { read_cell_type(s, {}); };
-  if (name == "cells") return [](Section& s) { read_cell(s, {}, true); };
+  if (name == "cells")
+    return [](Section& s) {
+      s.describe("type", "the name of one of [[cell_types]], which then has the keys that all its cells share", "");
+      read_cell(s, {}, true);
+    };
   if (name == "bodies") return read_body;
   if (name == "coupling") return read_coupling;
+  if (name == "contact") return read_contact;
   if (name == "stretching") return read_stretching;
   if (name == "output") return [](Section& s) { read_output(s, true, true); };
   return {};

@@ -6,7 +6,7 @@
 namespace corpuscle {
 
 // Beyond any cell's by orders of magnitude: what is larger is a slip of the unit, and sums of squares would overflow.
-constexpr double most_um = 1e7, most_uN_per_m = 1e9, most_J = 1e-9, most_Pa = 1e12, most_N_s_per_m = 1, most_pg = 1e12;
+constexpr double most_um = 1e7, most_uN_per_m = 1e9, most_J = 1e-9, most_Pa = 1e12, most_N_s_per_m = 1, most_pg = 1e12, most_nN = 1e9;
 constexpr double most_mm_per_s = 1e9, most_rad_per_s = 1e12, most_scale = 1e12;
 
 TimeSettings read_time(Section& s);
@@ -20,6 +20,7 @@ CellTypeSettings read_cell_type(Section& s, const std::vector<CellTypeSettings>&
 CellSettings read_cell(Section& s, const std::vector<CellTypeSettings>& types, bool placed);
 BodySettings read_body(Section& s);
 CouplingSettings read_coupling(Section& s);
+ContactSettings read_contact(Section& s);
 StretchingSettings read_stretching(Section& s);
 OutputSettings read_output(Section& s, bool has_fluid, bool has_surfaces);
 

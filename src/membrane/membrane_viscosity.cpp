@@ -3,20 +3,38 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "membrane/interface.hpp"
+
 namespace corpuscle {
 
-MembraneViscosity::MembraneViscosity(const MembraneViews& m, bool tangential) : tangential_(tangential) {
+MembraneViscosity::MembraneViscosity(bool tangential) : tangential_(tangential) {}
+
+void MembraneViscosity::make_room(const MembraneViews& m) {
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
-  const int entries = 3 * m.triangles;
-  views_.along = Table<double>(label("along_ring"), entries, 3);
-  views_.diagonal = Array<double>(label("diagonal_vertex"), m.vertices);
-  views_.block = Table<double>(label("block_vertex"), m.vertices, 6);
+  scratch_ = Array<double>(label("viscous_scratch"), scratch(m));
+  use_scratch(m, scratch_.data());
   views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
-  views_.gradient = Components<double>(label("gradient_vertex"), m.vertices, 3);
-  views_.residual = Components<double>(label("residual_vertex"), m.vertices, 3);
-  views_.search = Components<double>(label("search_vertex"), m.vertices, 3);
-  views_.image = Components<double>(label("image_vertex"), m.vertices, 3);
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
+}
+
+std::size_t MembraneViscosity::scratch(const MembraneViews& m) const {
+  return 9 * static_cast<std::size_t>(m.triangles) + 19 * static_cast<std::size_t>(m.vertices);
+}
+
+void MembraneViscosity::use_scratch(const MembraneViews& m, double* memory) {
+  const std::size_t vertices = m.vertices, entries = 3 * static_cast<std::size_t>(m.triangles);
+  const auto take = [&](std::size_t numbers) {
+    double* from = memory;
+    memory += numbers;
+    return from;
+  };
+  views_.along = Table<double>(take(3 * entries), entries, 3);
+  views_.diagonal = Array<double>(take(vertices), vertices);
+  views_.block = Table<double>(take(6 * vertices), vertices, 6);
+  views_.gradient = Components<double>(take(3 * vertices), vertices, 3);
+  views_.residual = Components<double>(take(3 * vertices), vertices, 3);
+  views_.search = Components<double>(take(3 * vertices), vertices, 3);
+  views_.image = Components<double>(take(3 * vertices), vertices, 3);
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -32,18 +50,14 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   }
 }
 
-void MembraneViscosity::remember_forces(const MembraneViews& m, const Components<double>& force) {
-  if (!last_force_.data()) last_force_ = Components<double>(uninitialised("corpuscle::membrane::last_force_vertex"), m.vertices, 3);
-  Kokkos::deep_copy(Exec(), last_force_, force);
-}
-
 template <class Damping>
 void MembraneViscosity::resist_with(const MembraneViews& m, const MotionViews& motion, double beta,
                                     const Components<double>& force) const {
   constexpr double massless = 1e300;  // us: mass over it
-  predict_viscous_velocity<Damping>(m, motion, views_, FluidReaction{beta, m.surface.v, last_force_, force}, massless);
+  predict_viscous_velocity<Damping>(m, motion, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
   keep_volume(m, motion);
-  subtract_damping<Damping>(m, views_.along, m.surface.v, force, last_force_);
+  subtract_damping<Damping>(m, views_.along, m.surface.v, force, views_.right_side);
+  copy_vertices(m.vertices, force, given_);
 }
 
 void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& motion, double beta,
@@ -55,7 +69,7 @@ void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& motion
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {
-  if (last_force_.data()) return damping_power(m, last_force_);  // they move as the fluid does, not quite as D was told
+  if (given_.data()) return damping_power(m, views_.right_side);  // they move as the fluid does, not quite as D was told
   return tangential_ ? viscous_power<FullDamping>(m) : viscous_power<CentralDamping>(m);
 }
 

@@ -8,7 +8,15 @@ namespace corpuscle {
 
 class MembraneViscosity {
  public:
-  MembraneViscosity(const MembraneViews& membranes, bool tangential);
+  explicit MembraneViscosity(bool tangential);
+  /// Memory for these membranes; or, if they are those that a rank holds at present, which move with the fluid, only what lasts
+  /// longer than a call: then use_scratch() with as many numbers as scratch() before each.
+  void make_room(const MembraneViews& m);
+  void hold(const MembraneViews& m);
+  std::size_t scratch(const MembraneViews& m) const;
+  void use_scratch(const MembraneViews& m, double* memory);
+  /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step; zero before the first.
+  const Components<double>& given() const { return given_; }
 
   template <class Load>
   void predict_velocity(const MembraneViews& m, const MotionViews& motion, const Load& load, double dt) const {
@@ -19,10 +27,9 @@ class MembraneViscosity {
     }
   }
 
-  /// See Membranes::remember_forces() and Membranes::resist(): solves (beta A + D) v = beta A U + F - F_last + q dV/dx for
-  /// m.surface.v, which holds U, with the pressure q inside that keeps the volume, and takes D v off the forces F. The triangle
-  /// geometry must be current; motion.direction is where the solver of q starts from.
-  void remember_forces(const MembraneViews& m, const Components<double>& force);
+  /// See Membranes::resist(): solves (beta A + D) v = beta A U + F - given + q dV/dx for m.surface.v, which holds U, with the
+  /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then. The triangle geometry must be
+  /// current; motion.direction is where the solver of q starts from.
   void resist(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
@@ -40,7 +47,8 @@ class MembraneViscosity {
   void resist_with(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   bool tangential_;
-  Components<double> last_force_;  // [vertex, 3] nN, only for membranes that move with the fluid; after resist() what it took off
+  Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
+  Array<double> scratch_;     // only without
   ViscosityViews views_;
 };
 

@@ -25,46 +25,62 @@ constexpr int most_substeps = 10000;  // a minute or so for one cell
 
 }  // namespace
 
-Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies) {
-  std::vector<CellSettings> representative;
-  std::vector<CellReference> types;
-  std::vector<int> type_of_cell;
-  std::vector<TriangleMesh> bodies;
-  bool viscous = false, tangential = false;
+CellTypes find_cell_types(const std::vector<CellSettings>& cells) {
+  CellTypes types;
+  std::vector<const CellSettings*> representative;
   for (const CellSettings& cell : cells) {
     const auto known = std::find_if(representative.begin(), representative.end(),
-                                    [&](const CellSettings& other) { return same_type(cell, other); });
-    const int type = int(known - representative.begin());
-    if (known == representative.end()) {
-      representative.push_back(cell);
-      types.push_back(make_reference(cell));
-    }
-    type_of_cell.push_back(type);
-    bodies.push_back(placed_mesh(types[type], cell));
-    law_.push_back(types[type].in_plane);
-    vertex_mass_.push_back(types[type].law.vertex_mass);
-    vertex_area_.push_back(types[type].smallest_vertex_area);
-    rest_area_.push_back(types[type].law.rest_area);
-    rest_volume_.push_back(types[type].law.rest_volume);
-    viscous |= types[type].law.central_damping > 0;
-    tangential |= types[type].law.tangential_damping > 0;
+                                    [&](const CellSettings* other) { return same_type(cell, *other); });
+    types.of_cell.push_back(int(known - representative.begin()));
+    if (known != representative.end()) continue;
+    representative.push_back(&cell);
+    types.references.push_back(make_reference(cell));
   }
+  return types;
+}
+
+Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies) {
+  const CellTypes types = find_cell_types(cells);
+  types_ = types.references;
+  std::vector<TriangleMesh> bodies;
+  std::vector<HeldCell> held;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    bodies.push_back(placed_mesh(types_[types.of_cell[c]], cells[c]));
+    held.push_back({types.of_cell[c], int(c)});
+  }
+  describe_cells(held, int(held.size()));
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
-  views_ = make_membrane_views(make_surface_set(bodies), types, type_of_cell);
-  views_.surface.cells = views_.cells;
-  elasticity_ = make_elasticity(types, type_of_cell);
+  views_ = make_membrane_views(make_surface_set(bodies, int(cells.size())), types_, types.of_cell);
+  elasticity_ = make_elasticity(types_, types.of_cell);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   status_host_ = HostCopy(views_.status);
   start_x_ = Components<double>(label("start_x_vertex"), views_.vertices, 3);
   start_v_ = Components<double>(label("start_v_vertex"), views_.vertices, 3);
-  if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(views_, tangential);
+  make_viscosity();
+  if (viscosity_) viscosity_->make_room(views_);
+}
+
+void Membranes::make_viscosity() {
+  bool viscous = false, tangential = false;
+  for (const CellReference& type : types_) {
+    viscous |= type.law.central_damping > 0;
+    tangential |= type.law.tangential_damping > 0;
+  }
+  if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(tangential);
+}
+
+std::vector<Components<double>> Membranes::carried() const {
+  std::vector<Components<double>> fields{views_.surface.x, views_.surface.v};
+  if (viscosity_) fields.push_back(viscosity_->given());
+  return fields;
 }
 
 Membranes::~Membranes() = default;
 
 void Membranes::estimate_stiffness() {
   if (views_.cells == 0) return;
+  take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
   largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue);
@@ -108,17 +124,15 @@ int Membranes::substeps(double dt_us, double beta) const {
 
 void Membranes::compute_forces() {
   if (views_.cells == 0) return;
+  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   elasticity_->membrane_forces(views_, views_.surface.x, views_.force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
-void Membranes::remember_forces(const Components<double>& force) {
-  if (viscosity_) viscosity_->remember_forces(views_, force);
-}
-
 void Membranes::resist(double beta, const Components<double>& force) {
-  if (!viscosity_) return;
+  if (!viscosity_ || views_.cells == 0) return;
+  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   Kokkos::deep_copy(motion_.direction, 0.0);  // so that a step depends on the state alone
   viscosity_->resist(views_, motion_, beta, force);
@@ -189,6 +203,7 @@ void Membranes::set_out(double ahead_us) {
 
 void Membranes::drift(double dt, double share) {
   if (views_.cells == 0) return;
+  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   measure_drift(views_, motion_);
   project_and_drift(views_, motion_, start_x_, start_v_, share, dt);
@@ -200,15 +215,19 @@ void Membranes::drift(double dt, double share) {
 
 double Membranes::fastest_relaxation_per_us(const MobilityModel& model) {
   const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
-  std::vector<int> first_of_type;
-  for (int c = 0; c < views_.cells; ++c)
-    if (type(c) == static_cast<int>(first_of_type.size())) first_of_type.push_back(c);
-  return fastest_relaxation(model, first_of_type);
+  std::vector<int> one_of_each;
+  std::vector<bool> known(types_.size(), false);
+  for (int c = 0; c < views_.cells; ++c) {
+    if (!known[type(c)]) one_of_each.push_back(c);
+    known[type(c)] = true;
+  }
+  return one_of_each.empty() ? 0 : fastest_relaxation(model, one_of_each);
 }
 
 /// Power iteration on mobility times stiffness, for some of the cells.
 double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells) {
   constexpr double distance = 1e-4;  // um, as for the stiffness
+  take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   start_mode(views_, work);
@@ -236,7 +255,7 @@ void Membranes::explain(int cell, double dt) {
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   const CellDiagnostics before = diagnostics()[cell];
   const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
-  const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", cell, before.centroid_um[0],
+  const std::string where = fmt::format("cell {} at ({:.2f}, {:.2f}, {:.2f}) um", number_[cell], before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
   const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
   const std::string step =

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/workspace.hpp"
 #include "immersed/surface.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/membrane_views.hpp"
@@ -29,6 +30,20 @@ struct CellDiagnostics {
   Triple extent_um() const { return {upper_um[0] - lower_um[0], upper_um[1] - lower_um[1], upper_um[2] - lower_um[2]}; }
 };
 
+/// One cell of those that a rank holds.
+struct HeldCell {
+  int type = 0;
+  int number = 0;  // of the cell in the whole scene
+};
+
+/// The types among cells, in the order in which they appear, and the type of each cell.
+struct CellTypes {
+  std::vector<CellReference> references;
+  std::vector<int> of_cell;
+};
+/// @throws InputError  for settings out of range or meshes that are not closed
+CellTypes find_cell_types(const std::vector<CellSettings>& cells);
+
 class MembraneViscosity;
 
 class Membranes {
@@ -36,9 +51,21 @@ class Membranes {
   /// Build the cells' meshes and references, and one surface set that holds the cells first and then `rigid_bodies`.
   /// @throws InputError  for settings out of range or meshes that are not closed
   explicit Membranes(const std::vector<CellSettings>& cells, const std::vector<TriangleMesh>& rigid_bodies = {});
+  /// None yet: hold() says which. @param workspace  shared with others that do not use it in the calls below
+  Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace);
   ~Membranes();
   Membranes(const Membranes&) = delete;
   Membranes& operator=(const Membranes&) = delete;
+
+  /// Hold these cells, of which the first `own` are this rank's: only those have forces and move here, the others are surfaces.
+  /// Allocates where there is no room, with some to spare. Arrays of what vertices carry keep their content, row by row; what
+  /// does not belong there any more is for the caller to replace.
+  void hold(const std::vector<HeldCell>& cells, int own);
+  /// What belongs to the own cells' vertices from one step to the next, and travels with them: [vertex, 3] each.
+  std::vector<Components<double>> carried() const;
+  const std::vector<CellReference>& types() const { return types_; }
+  /// One body for each type, as it is made or read; only with hold().
+  const SurfaceSet& templates() const { return templates_; }
 
   /// The surfaces as the fluid sees them; x and v are the membranes' own arrays. Normals and areas are refreshed by
   /// update_surface_geometry, not here.
@@ -48,6 +75,10 @@ class Membranes {
   const Elasticity& elasticity() const { return *elasticity_; }
   /// In the plane of a cell's membrane.
   const MembraneLaw& law(int cell) const { return law_[cell]; }
+  /// Of a cell in the whole scene.
+  int number(int cell) const { return number_[cell]; }
+  /// Whether anything but its in-plane law answers a change of a cell's area.
+  bool holds_area(int cell) const { return holds_area_[cell]; }
   int cells() const { return views_.cells; }
   int vertices() const { return views_.vertices; }
 
@@ -60,11 +91,9 @@ class Membranes {
   /// Internal forces at the present positions into views().force [vertex, 3] nN.
   /// @throws ComputationError  if a triangle is strained beyond the limit of its law
   void compute_forces();
-  /// Of membranes that move with a fluid, viscous ones alone: before the forces on the fluid are worked out anew, keep those,
-  /// [vertex, 3] nN, that it had in its last step, when it moved them with surfaces().v.
-  void remember_forces(const Components<double>& force);
-  /// After it, once `force` holds all others (views().force, or that and what else acts): take what membrane viscosity resists, as
-  /// the fluid will move them, off `force` and views().force. surfaces().v becomes an estimate of that velocity.
+  /// Of membranes that move with a fluid, once `force` holds all that acts on the fluid but membrane viscosity (views().force, or
+  /// that and what else acts), [vertex, 3] nN: take what that resists, as the fluid will move them, off `force` and views().force.
+  /// surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
   /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
   ///              deformations; twice that is too much
   void resist(double beta, const Components<double>& force);
@@ -108,7 +137,7 @@ class Membranes {
   void save_state();
   void restore_state();
 
-  /// One entry a cell. Copies from the device: for output, not for every sub-step.
+  /// One entry for each of this rank's cells. Copies from the device: for output, not for every sub-step.
   std::vector<CellDiagnostics> diagnostics();
 
   /// Estimate the stiffness anew at the next advance(): the cells' constants are not those of the state.
@@ -130,6 +159,10 @@ class Membranes {
     long calls = 0;
   };
 
+  void make_viscosity();
+  void describe_cells(const std::vector<HeldCell>& cells, int own);
+  void make_room(const SurfaceSet& needed);
+  void take_workspace();
   void estimate_stiffness();
   void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                      const Components<double>& v_star);
@@ -143,6 +176,11 @@ class Membranes {
   std::unique_ptr<Elasticity> elasticity_;
   MotionViews motion_;
   HostCopy<Array<int>> status_host_;
+  std::vector<CellReference> types_;
+  SurfaceSet templates_;                         // one body for each type; only with hold()
+  std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
+  std::vector<int> number_;                      // [cell] in the whole scene
+  std::vector<bool> holds_area_;                 // [cell]
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
   std::vector<MembraneLaw> law_;                 // [cell]
   std::vector<double> vertex_mass_;              // [cell] pg

@@ -116,7 +116,7 @@ auto type_key(const CellSettings& c) {
   return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align,
                   c.mass_pg, c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation,
                   c.shear_modulus_uN_per_m, c.bending_modulus_fJ, c.area_modulus_uN_per_m,
-                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.dissipation);
+                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.viscosity_ratio, c.dissipation);
 }
 
 }  // namespace
@@ -126,6 +126,7 @@ CellReference make_reference(const CellSettings& cell) {
   r.law = make_law(cell);
   r.in_plane = make_in_plane_law(cell);
   r.mesh = make_mesh(cell);
+  r.viscosity_ratio = cell.viscosity_ratio;
   const int vertices = int(r.mesh.vertices.size());
   r.law.vertex_mass = cell.mass_pg / vertices;
   measure(r);

@@ -23,13 +23,37 @@ CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::v
       triangles_(triangles.size() / 3),
       series_(folder, "cells", format_name, comm, "mesh", {"triangles", "body"},
               [this](const StoredTime& time, const Hdf5File& file) { return describe(time, file); }) {
+  begin(folder, restart_us, [&] { create(triangles, bodies); });
+}
+
+CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
+                       const std::vector<std::int32_t>& bodies, const SurfaceShare& mine, std::optional<double> restart_us)
+    : comm_(comm),
+      vertices_(mine.vertices),
+      triangles_(mine.triangles),
+      series_(folder, "cells", format_name, comm, "mesh", {"triangles", "body"},
+              [this](const StoredTime& time, const Hdf5File& file) { return describe(time, file); }) {
+  begin(folder, restart_us, [&] { create_shared(triangles, bodies, mine); });
+}
+
+void CellWriter::begin(const std::string& folder, std::optional<double> restart_us, const std::function<void()>& create) {
   if (restart_us && series_.exists()) {
     on_root(comm_, [&] { require_same_surfaces((std::filesystem::path(folder) / "cells.h5").string()); });
     series_.resume(*restart_us);
   } else {
     series_.create();
-    create(triangles, bodies);
+    create();
   }
+}
+
+void CellWriter::create_shared(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies,
+                               const SurfaceShare& mine) {
+  auto file = Hdf5File::create(series_.shared_path(), comm_);
+  file.attribute("/", "vertices", static_cast<std::int64_t>(vertices_));
+  file.write("triangles", {triangles_, 3}, mine.triangle_rows, triangles.data());
+  file.write("body", {triangles_}, mine.triangle_rows, bodies.data());
+  file.close();
+  series_.finish_shared();
 }
 
 void CellWriter::create(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies) {
@@ -70,6 +94,22 @@ void CellWriter::write(double time_us, long step, const double* x, const std::ve
   series_.finish(step, time_us);
 }
 
+void CellWriter::write(double time_us, long step, const SurfaceShare& mine, const double* x,
+                       const std::vector<VertexField>& fields, const std::vector<CellTable>& tables) {
+  auto file = Hdf5File::create(series_.step_path(step), comm_);
+  const auto shape = [](hsize_t rows, int components) {
+    return components == 1 ? Shape{rows} : Shape{rows, static_cast<hsize_t>(components)};
+  };
+  file.write("x_um", {vertices_, 3}, mine.vertex_rows, x);
+  for (const auto& field : fields) file.write(field.name, shape(vertices_, field.components), mine.vertex_rows, field.values);
+  for (const auto& table : tables)
+    file.write("per_cell/" + table.name, shape(mine.cells, table.components), mine.cell_rows, table.values);
+  file.attribute("/", "time_us", time_us);
+  file.attribute("/", "step", static_cast<std::int64_t>(step));
+  file.close();
+  series_.finish(step, time_us);
+}
+
 std::string CellWriter::describe(const StoredTime& time, const Hdf5File& file) const {
   const std::string mesh = "cells/mesh.h5", own = "cells/" + time.group + ".h5";
   auto text =
@@ -78,7 +118,7 @@ std::string CellWriter::describe(const StoredTime& time, const Hdf5File& file) c
   text += fmt::format("    <Geometry GeometryType=\"XYZ\">\n     {}\n    </Geometry>\n",
                       xdmf_item(own, "x_um", {vertices_, 3}, "Float", 8));
   for (const auto& name : file.entries("/")) {
-    if (name == "x_um") continue;
+    if (name == "x_um" || name == "per_cell") continue;
     const auto shape = file.shape(name);
     text += xdmf_attribute(name, shape.size() == 2 ? 3 : 1, "Node", xdmf_item(own, name, shape, "Float", 8));
   }

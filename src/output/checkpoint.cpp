@@ -148,6 +148,21 @@ void CheckpointWriter::add_part(const std::string& name, const Shape& shape, con
   list_array(name, shape, sum);
 }
 
+template <class T>
+void CheckpointWriter::add_rows(const std::string& name, const Shape& shape, const Rows& mine, const T* values) {
+  file_->write(name, shape, mine, values);
+  std::uint32_t sum = 0;
+  hsize_t row = 1;
+  for (std::size_t d = 1; d < shape.size(); ++d) row *= shape[d];
+  for (const Rows::Piece& piece : mine.pieces) {
+    Slab part = whole_of(shape);
+    part.offset[0] = piece.first, part.count[0] = piece.count;
+    sum += checksum(shape, part, values);
+    values += piece.count * row;
+  }
+  list_array(name, shape, sum_over_ranks(comm_, sum));
+}
+
 void CheckpointWriter::list_array(const std::string& name, const Shape& shape, std::int64_t sum) {
   file_->attribute(name, "checksum", sum);
   seal_array(array_seal_, name, shape, sum);
@@ -165,6 +180,13 @@ void CheckpointWriter::add(const std::string& name, const Shape& shape, const Sl
 }
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* values) {
   add_part(name, shape, mine, values);
+}
+
+void CheckpointWriter::add(const std::string& name, const Shape& shape, const Rows& mine, const double* values) {
+  add_rows(name, shape, mine, values);
+}
+void CheckpointWriter::add(const std::string& name, const Shape& shape, const Rows& mine, const std::int64_t* values) {
+  add_rows(name, shape, mine, values);
 }
 
 void CheckpointWriter::add_text(const std::string& name, const std::string& text) {

@@ -46,6 +46,10 @@ class CheckpointWriter {
   void add(const std::string& name, const Shape& shape, const Slab& mine, const double* values);
   void add(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* values);
 
+  /// Each rank its own rows of the whole.
+  void add(const std::string& name, const Shape& shape, const Rows& mine, const double* values);
+  void add(const std::string& name, const Shape& shape, const Rows& mine, const std::int64_t* values);
+
   /// A text, the same on all ranks.
   void add_text(const std::string& name, const std::string& text);
 
@@ -57,6 +61,8 @@ class CheckpointWriter {
   void add_whole(const std::string& name, const Shape& shape, const T* values);
   template <class T>
   void add_part(const std::string& name, const Shape& shape, const Slab& mine, const T* values);
+  template <class T>
+  void add_rows(const std::string& name, const Shape& shape, const Rows& mine, const T* values);
   void list_array(const std::string& name, const Shape& shape, std::int64_t sum);
 
   std::string path_, temporary_;

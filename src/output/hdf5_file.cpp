@@ -188,10 +188,65 @@ void Hdf5File::write_slab(const std::string& name, const Shape& shape, const Sla
     H5Sselect_none(space);
     H5Sselect_none(source);
   }
+  write_selected(name, set, type, source, space, data, failure);
+}
+
+/// Each rank writes its part on its own, and what that came to is agreed on: in a collective write that fails on one rank
+/// the others may wait for it for ever (Open MPI 4.1).
+void Hdf5File::write_selected(const std::string& name, hid_t set, hid_t type, hid_t source, hid_t space, const void* data,
+                              std::string failure) {
   settle(failure);
-  // Each rank writes its part on its own, and what that came to is agreed on: in a collective write that fails on one rank
-  // the others may wait for it for ever (Open MPI 4.1).
   settle(H5Dwrite(set, type, source, space, H5P_DEFAULT, data) < 0 ? write_failure(name) : "");
+}
+
+void Rows::add(hsize_t first, hsize_t count) {
+  if (count == 0) return;
+  if (!pieces.empty() && pieces.back().first + pieces.back().count == first)
+    pieces.back().count += count;
+  else
+    pieces.push_back({first, count});
+}
+
+hsize_t Rows::count() const {
+  hsize_t sum = 0;
+  for (const Piece& piece : pieces) sum += piece.count;
+  return sum;
+}
+
+void Hdf5File::write_rows(const std::string& name, const Shape& shape, const Rows& mine, hid_t type, const void* data) {
+  double bytes = static_cast<double>(H5Tget_size(type));
+  for (const auto n : shape) bytes *= static_cast<double>(n);
+  require_space(name, bytes);
+  const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose);
+  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links, 1);
+  const Handle set(H5Dcreate2(file_, name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+  std::string failure = set.bad() ? write_failure(name) : "";
+  Shape first(shape.size(), 0), count = shape;
+  H5Sselect_none(space);
+  for (const Rows::Piece& piece : mine.pieces) {
+    first[0] = piece.first, count[0] = piece.count;
+    H5Sselect_hyperslab(space, H5S_SELECT_OR, first.data(), nullptr, count.data(), nullptr);
+  }
+  count[0] = mine.count();
+  const bool none = count[0] == 0;
+  if (none) count[0] = 1;
+  const Handle source(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
+  if (none) H5Sselect_none(source);
+  if (failure.empty() && !none && H5Sselect_valid(space) <= 0)
+    failure = fmt::format("{}: writing {} failed: this rank's part lies outside the array", path_, name);
+  const double nothing = 0;
+  write_selected(name, set, type, source, space, none ? &nothing : data, failure);
+}
+
+void Hdf5File::write(const std::string& name, const Shape& shape, const Rows& mine, const double* data) {
+  write_rows(name, shape, mine, H5T_NATIVE_DOUBLE, data);
+}
+void Hdf5File::write(const std::string& name, const Shape& shape, const Rows& mine, const std::int32_t* data) {
+  write_rows(name, shape, mine, H5T_NATIVE_INT32, data);
+}
+void Hdf5File::write(const std::string& name, const Shape& shape, const Rows& mine, const std::int64_t* data) {
+  write_rows(name, shape, mine, H5T_NATIVE_INT64, data);
 }
 
 void Hdf5File::write(const std::string& name, const Shape& shape, const double* data) {

@@ -28,6 +28,18 @@ struct Slab {
   Shape offset, count;
 };
 
+/// Rows of a data set, in rising order: what one rank holds where that is no box.
+struct Rows {
+  struct Piece {
+    hsize_t first, count;
+  };
+  std::vector<Piece> pieces;
+
+  /// Adds rows behind the others; what continues the last piece becomes part of it.
+  void add(hsize_t first, hsize_t count);
+  hsize_t count() const;
+};
+
 class Hdf5File {
  public:
   /// A new file. With a communicator of several ranks every call below is collective.
@@ -58,6 +70,11 @@ class Hdf5File {
              const Shape& memory = {});
   void write(const std::string& name, const Shape& shape, const Slab& mine, const std::int8_t* data);
   void write(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* data);
+
+  /// This rank's rows of a data set, one after the other in memory.
+  void write(const std::string& name, const Shape& shape, const Rows& mine, const double* data);
+  void write(const std::string& name, const Shape& shape, const Rows& mine, const std::int32_t* data);
+  void write(const std::string& name, const Shape& shape, const Rows& mine, const std::int64_t* data);
 
   /// A text of any length as a data set (attributes end at 64 KiB).
   void write_text(const std::string& name, const std::string& text);
@@ -94,6 +111,9 @@ class Hdf5File {
   void require_space(const std::string& name, double bytes) const;
   void write_slab(const std::string& name, const Shape& shape, const Slab* mine, hid_t type, const void* data,
                   const Shape& memory);
+  void write_rows(const std::string& name, const Shape& shape, const Rows& mine, hid_t type, const void* data);
+  void write_selected(const std::string& name, hid_t set, hid_t type, hid_t source, hid_t space, const void* data,
+                      std::string failure);
   void read_slab(const std::string& name, const Slab* part, hid_t type, void* data) const;
   void write_attribute(const std::string& object, const std::string& name, hid_t type, const void* value);
   void read_attribute(const std::string& object, const std::string& name, hid_t type, void* value) const;

@@ -23,6 +23,8 @@ class Comm {
   }
   MPI_Comm handle() const { return comm_; }
 #endif
+  /// This rank by itself.
+  static Comm alone();
   int rank() const { return rank_; }
   int size() const { return size_; }
   bool root() const { return rank_ == 0; }

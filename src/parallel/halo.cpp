@@ -23,14 +23,14 @@ bool cut_is_possible(const std::array<int, 3>& ranks, const std::array<int, 3>& 
 }
 
 /// Slab of `layers` cells on one side, inside (owned) or outside (halo), as wide as already exchanged directions allow.
-CellBox slab(const IndexSpace& index, int d, int side, bool outside) {
+CellBox slab(const IndexSpace& index, int d, int side, bool outside, int layers) {
   CellBox box;
   for (int e = 0; e < 3; ++e) {
-    const int pad = e < d ? IndexSpace::halo : 0;
+    const int pad = e < d ? layers : 0;
     box.lower[e] = -pad;
     box.upper[e] = index.n[e] + pad;
   }
-  const int h = IndexSpace::halo, n = index.n[d];
+  const int h = layers, n = index.n[d];
   if (side == 0) {
     box.lower[d] = outside ? -h : 0;
     box.upper[d] = outside ? 0 : h;
@@ -40,6 +40,33 @@ CellBox slab(const IndexSpace& index, int d, int side, bool outside) {
   }
   return box;
 }
+
+/// Whether messages may start and end in the fields themselves.
+constexpr bool whole_planes_pass = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
+
+#ifdef CORPUSCLE_MPI
+/// Along the last direction layers are whole planes, each component's in one piece, which pass from field to field.
+template <class Field>
+void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neighbour)[2], const Field& field, int components,
+                     int layers) {
+  using Value = typename Field::non_const_value_type;
+  const int h = IndexSpace::halo, n = index.n[2], plane = index.stride(2), size = layers * plane;
+  const int bytes = size * static_cast<int>(sizeof(Value)), first = index.cell(-h, -h, 0);
+  const int sent[2] = {first, first + (n - layers) * plane}, filled[2] = {first - size, first + n * plane};
+  MPI_Request request[12];
+  int pending = 0;
+  Exec().fence();
+  for (int side = 0; side < 2; ++side)
+    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
+      MPI_Irecv(field.data() + static_cast<std::size_t>(m) * index.size() + filled[side], bytes, MPI_BYTE, neighbour[side],
+                2 * m + 1 - side, comm.handle(), &request[pending++]);
+  for (int side = 0; side < 2; ++side)
+    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
+      MPI_Isend(field.data() + static_cast<std::size_t>(m) * index.size() + sent[side], bytes, MPI_BYTE, neighbour[side],
+                2 * m + side, comm.handle(), &request[pending++]);
+  MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
+}
+#endif
 
 }  // namespace
 
@@ -93,7 +120,7 @@ Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& 
       to[d] = (to[d] + ranks[d]) % ranks[d];
       neighbour_[d][side] = beyond && !index.periodic[d] ? -1 : to[0] + ranks[0] * (to[1] + ranks[1] * to[2]);
       if (neighbour_[d][side] >= 0 && neighbour_[d][side] != comm.rank())
-        largest = std::max(largest, slab(index, d, side, true).size());
+        largest = std::max(largest, slab(index, d, side, true, IndexSpace::halo).size());
     }
   }
   for (int side = 0; side < 2 && largest > 0; ++side) {
@@ -104,33 +131,44 @@ Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& 
   }
 }
 
+bool Halo::shared() const {
+  for (const auto& sides : neighbour_)
+    if (sides[0] >= 0 || sides[1] >= 0) return true;
+  return false;
+}
+
 template <class Field>
-void Halo::run(const Field& field) {
+void Halo::run(const Field& field, int layers) {
   using Value = typename Field::non_const_value_type;
   [[maybe_unused]] const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
   for (int d = 0; d < 3; ++d) {
     const int low = neighbour_[d][0], high = neighbour_[d][1];
+    if (low < 0 && high < 0) continue;
     if (low == comm_.rank() && high == comm_.rank()) {  // periodic within this rank
-      copy_shifted(index_, slab(index_, d, 0, true), d, index_.n[d], field);
-      copy_shifted(index_, slab(index_, d, 1, true), d, -index_.n[d], field);
+      copy_shifted(index_, slab(index_, d, 0, true, layers), d, index_.n[d], field);
+      copy_shifted(index_, slab(index_, d, 1, true, layers), d, -index_.n[d], field);
       continue;
     }
 #ifdef CORPUSCLE_MPI
+    if (d == 2 && whole_planes_pass) {
+      exchange_planes(comm_, index_, neighbour_[2], field, components, layers);
+      continue;
+    }
     MPI_Request request[4];
     int pending = 0;
     for (int side = 0; side < 2; ++side) {
       if (neighbour_[d][side] < 0) continue;
-      const int count = slab(index_, d, side, true).size() * components;
+      const int count = slab(index_, d, side, true, layers).size() * components;
       MPI_Irecv(receive_host_[side].data(), count * static_cast<int>(sizeof(Value)), MPI_BYTE, neighbour_[d][side],
                 1 - side, comm_.handle(), &request[pending++]);
     }
     for (int side = 0; side < 2; ++side) {
       if (neighbour_[d][side] < 0) continue;
-      const CellBox box = slab(index_, d, side, false);
+      const CellBox box = slab(index_, d, side, false, layers);
       Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(send_[side].data()),
                                                                     box.size() * components);
       pack_box(index_, box, field, buffer);
-      Kokkos::deep_copy(send_host_[side], send_[side]);
+      if (send_host_[side].data() != send_[side].data()) Kokkos::deep_copy(send_host_[side], send_[side]);
       Exec().fence();
       MPI_Isend(send_host_[side].data(), box.size() * components * static_cast<int>(sizeof(Value)), MPI_BYTE,
                 neighbour_[d][side], side, comm_.handle(), &request[pending++]);
@@ -138,8 +176,8 @@ void Halo::run(const Field& field) {
     MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
     for (int side = 0; side < 2; ++side) {
       if (neighbour_[d][side] < 0) continue;
-      const CellBox box = slab(index_, d, side, true);
-      Kokkos::deep_copy(receive_[side], receive_host_[side]);
+      const CellBox box = slab(index_, d, side, true, layers);
+      if (receive_[side].data() != receive_host_[side].data()) Kokkos::deep_copy(receive_[side], receive_host_[side]);
       Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(receive_[side].data()),
                                                                     box.size() * components);
       unpack_box(index_, box, buffer, field);
@@ -148,12 +186,13 @@ void Halo::run(const Field& field) {
   }
 }
 
-template void Halo::run(const Components<double>&);
-template void Halo::run(const Array<double>&);
-template void Halo::run(const Components<float>&);
-template void Halo::run(const Array<float>&);
-template void Halo::run(const Array<int>&);
-template void Halo::run(const Array<NodeKind>&);
-template void Halo::run(const Array<std::int8_t>&);
+template void Halo::run(const Components<double>&, int);
+template void Halo::run(const Array<double>&, int);
+template void Halo::run(const Components<float>&, int);
+template void Halo::run(const Array<float>&, int);
+template void Halo::run(const Array<int>&, int);
+template void Halo::run(const Array<unsigned long long>&, int);
+template void Halo::run(const Array<NodeKind>&, int);
+template void Halo::run(const Array<std::int8_t>&, int);
 
 }  // namespace corpuscle

@@ -22,20 +22,20 @@ class Halo {
  public:
   Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& ranks_per_direction);
 
-  void exchange(const Components<double>& field) { run(field); }
-  void exchange(const Array<double>& field) { run(field); }
-  void exchange(const Components<float>& field) { run(field); }
-  void exchange(const Array<float>& field) { run(field); }
-  void exchange(const Array<int>& field) { run(field); }
-  void exchange(const Array<NodeKind>& field) { run(field); }
-  void exchange(const Array<std::int8_t>& field) { run(field); }
+  /// @param layers  how many of them to fill, from the block outwards
+  template <class Field>
+  void exchange(const Field& field, int layers = IndexSpace::halo) {
+    run(field, layers);
+  }
+  /// Whether any layer is filled: it is not on a rank alone without periodic directions.
+  bool shared() const;
 
   /// Rank owning the neighbouring block on side (0 low, 1 high) of direction d; -1 beyond a physical boundary.
   int neighbour(int d, int side) const { return neighbour_[d][side]; }
 
  private:
   template <class Field>
-  void run(const Field& field);
+  void run(const Field& field, int layers);
 
   Comm comm_;
   IndexSpace index_;

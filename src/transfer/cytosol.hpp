@@ -12,13 +12,19 @@
 
 namespace corpuscle {
 
+/// What a surface set does not say of its bodies.
+struct BodyKinds {
+  Array<int> type;   // [body]
+  Table<int> turns;  // [body, 3] periods by which a copy of a body is shifted
+};
+
 class Cytosol {
  public:
-  /// @param ratio  [cell] inner over outer viscosity; one of them at least is not 1
+  /// @param ratio  [type] inner over outer viscosity; one of them at least is not 1
   Cytosol(Grid& grid, const std::vector<double>& ratio);
 
   /// The viscosity with the surfaces where the transfer has placed their vertices.
-  void update(const Transfer& transfer, const SurfaceSet& surfaces);
+  void update(const Transfer& transfer, const SurfaceSet& surfaces, const BodyKinds& kinds);
   /// Over that outside, [cell] with valid halos, 1 on the sides: shared with the fluid.
   const Array<double>& relative_viscosity() const { return viscosity_.relative; }
   /// The mean of its inverse, [cell]: more than the inverse of that where a cell holds two fluids.
@@ -35,7 +41,7 @@ class Cytosol {
   Grid* grid_;
   std::vector<double> ratios_;  // those there are but 1
   double least_ = 1;
-  Array<int> material_;  // [cell] into ratios_; -1 for 1
+  Array<int> material_;  // [type] into ratios_; -1 for 1
   InsideViews inside_;
   CytosolViews viscosity_;
   std::vector<std::unique_ptr<RankRow>> row_;  // [direction]

@@ -16,27 +16,9 @@ View make(const char* name, Extents... extents) {
   return View(uninitialised(std::string("corpuscle::transfer::") + name), extents...);
 }
 
-/// All shifts by -1, 0 or +1 period; the identity first.
-PeriodImages period_images(const Grid& grid) {
-  const IndexSpace& index = grid.index();
-  PeriodImages images;
-  images.count = 0;
-  for (int k = 0; k < 27; ++k) {
-    const int step[3] = {(k % 3 + 1) % 3 - 1, (k / 3 % 3 + 1) % 3 - 1, (k / 9 + 1) % 3 - 1};
-    Vec3 shift;
-    bool allowed = true;
-    for (int d = 0; d < 3; ++d) {
-      allowed = allowed && (step[d] == 0 || index.periodic[d]);
-      for (int m = 0; m < 3; ++m) shift[m] += step[d] * grid.period(d)[m];
-      images.turns[images.count][d] = step[d];
-    }
-    if (allowed) images.shift[images.count++] = shift;
-  }
-  return images;
-}
-
 /// Bounds of the lattice in space, widened by one of its links.
-void find_bounds(const Lattice& lattice, MarkerSearch& search) {
+/// @returns the longest link
+double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lattice.x);
   double link = 0;
   search.lower = {1e300, 1e300, 1e300};
@@ -54,6 +36,7 @@ void find_bounds(const Lattice& lattice, MarkerSearch& search) {
       }
   search.lower -= {link, link, link};
   search.upper += {link, link, link};
+  return link;
 }
 
 void set_reflections(const std::vector<BoundarySettings>& boundaries, TransferBlock& block) {
@@ -76,8 +59,9 @@ void Transfer::with_kernel(const Use& use) const {
     use(ThreePointDelta());
 }
 
-Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices)
-    : grid_(&grid), kernel_(kernel) {
+Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
+                   std::shared_ptr<Workspace> workspace)
+    : grid_(&grid), kernel_(kernel), workspace_(std::move(workspace)) {
   const GridViews& views = grid.views();
   const int cells = views.index.size();
   block_.lattice = make_lattice(views);
@@ -90,40 +74,57 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   if (moment_ > 0) prepare_sharpening();
   set_reflections(boundaries, block_);
   search_.lattice = block_.lattice;
-  search_.images = period_images(grid);
-  find_bounds(block_.lattice, search_);
+  largest_spacing_ = find_bounds(block_.lattice, search_);
   with_kernel([&](auto delta) { search_.reach = decltype(delta)::reach; });
-  places_ = {make<Table<double>>("vertex_xi", vertices, 3), make<Array<int>>("vertex_image", vertices),
-             make<Array<unsigned>>("vertex_reach", vertices), make<Array<int>>("vertex_first", vertices + 1),
-             make<Array<int>>("beyond", 1)};
-  Kokkos::deep_copy(places_.image, -1);
+  places_.beyond = make<Array<int>>("beyond", 1);
   beyond_host_ = HostCopy(places_.beyond);
   markers_.start = make<Array<int>>("cell_start", cells + 1);
   markers_.near = make<Array<unsigned char>>("cell_near", cells);
-  make_room(vertices);
+  make_places(vertices);
+}
+
+/// Of vertices of which nothing is known.
+void Transfer::make_places(int vertices) {
+  places_.vertices = vertices;
+  if (!places_.known.data() || places_.known.extent(0) < static_cast<std::size_t>(vertices)) {
+    const int room = vertices + vertices / 16 + 1;
+    places_.xi = Table<double>();
+    places_.xi = make<Table<double>>("vertex_xi", room, 3);
+    places_.known = make<Array<unsigned char>>("vertex_known", room);
+    places_.reach = make<Array<unsigned char>>("vertex_reach", room);
+  }
+  Kokkos::deep_copy(places_.known, static_cast<unsigned char>(0));
+}
+
+void Transfer::take_up(const SurfaceSet& set) {
+  make_places(set.vertices);
+  if (set.bodies > 0) seed_places(search_, set, places_);
 }
 
 void Transfer::make_room(int markers) {
-  if (markers <= room_) return;
-  room_ = markers + markers / 10;
+  if (markers > room_) {
+    room_ = markers + markers / 16 + 1;
+    markers_.vertex = make<Array<int>>("marker_vertex", room_);
+    markers_.home = make<Array<unsigned char>>("marker_home", room_);
+    markers_.eta = make<Table<double>>("marker_eta", room_, 3);
+    markers_.base = make<Table<short>>("marker_base", room_, 6);
+    markers_.order = make<Array<int>>("marker_order", room_);
+  }
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
-  markers_.vertex = make<Array<int>>("marker_vertex", room_);
-  markers_.home = make<Array<unsigned char>>("marker_home", room_);
-  markers_.eta = make<Table<double>>("marker_eta", room_, 3);
-  markers_.base = make<Table<short>>("marker_base", room_, 6);
-  markers_.weight = make<Table<double>>("marker_weight", room_, 6 * points);
-  markers_.inverse = make<Table<double>>("marker_inverse", room_, 9);
-  markers_.across = make<Table<double>>("marker_across", room_, 3);
-  markers_.velocity = make<Components<double>>("marker_velocity", room_, 3);
-  markers_.order = make<Array<int>>("marker_order", room_);
+  const auto rows = static_cast<std::size_t>(room_);
+  double* memory = workspace_->reserve((6 * points + 3) * rows);
+  markers_.weight = Table<double>(memory, rows, 6 * points);
+  markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
 }
 
 int Transfer::place(const Components<double>& x) {
-  find_images(search_, x, places_);
-  markers_.count = number_markers(places_);
+  find_vertices(search_, x, places_);
+  markers_.count = number_markers(places_, markers_, room_);
+  const bool again = markers_.count > room_;
   make_room(markers_.count);
-  fill_markers(search_, x, places_, markers_);
+  if (again) number_markers(places_, markers_, room_);
+  fill_markers(search_, places_, markers_);
   sort_markers(block_.index(), markers_);
   with_kernel([&](auto delta) {
     prepare_markers<decltype(delta)>(block_, markers_);
@@ -156,8 +157,10 @@ void Transfer::prepare_sharpening() {
 void Transfer::spread(const Components<double>& force) {
   const bool sharp = moment_ > 0;
   const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
-  resolve_forces(markers_, force);
-  with_kernel([&](auto delta) { spread_forces<decltype(delta)>(block_, markers_, spread); });
+  with_kernel([&](auto delta) {
+    resolve_forces<decltype(delta)>(block_, markers_, force);
+    spread_forces<decltype(delta)>(block_, markers_, spread);
+  });
   for (int d = 0; d < 3; ++d) {
     grid_->halo().exchange(spread.across[d]);
     if (!sharp) continue;
@@ -168,22 +171,28 @@ void Transfer::spread(const Components<double>& force) {
 
 void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                            const Components<double>& velocity) {
+  Kokkos::deep_copy(Exec(), velocity, 0.0);
   const bool sharp = moment_ > 0;
   for (int d = 0; d < 3 && sharp; ++d) {
     copy_faces(block_.index(), d, flux[d], raw_[d]);
     grid_->halo().exchange(raw_[d]);
     sharpen_faces(block_.lattice, d, moment_, false, raw_[d], sharp_flux_[d]);
   }
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_); });
-  if (slip) add_slip(block_, *slip, markers_);
-  collect_velocity(places_.first, markers_, velocity);
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity); });
+  if (slip) add_slip(block_, *slip, markers_, velocity);
 }
 
 SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                         const Array<double>& chi) const {
+                         const Array<double>& gap) const {
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
-  return {law, viscosity, force, surface.normal, surface.area, chi};
+  return {law, viscosity, force, surface.normal, surface.area, gap};
+}
+
+double Transfer::marker_radius() const {
+  double radius = 0;
+  with_kernel([&](auto delta) { radius = decltype(delta)::radius; });
+  return radius;
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }

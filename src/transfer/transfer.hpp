@@ -1,6 +1,9 @@
 // Forces from vertices to the grid's faces and velocities back, with one kernel and its transpose.
 #pragma once
 
+#include <memory>
+
+#include "core/workspace.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
 #include "immersed/surface_views.hpp"
@@ -13,8 +16,12 @@ class Transfer {
  public:
   /// @param boundaries  one entry per side
   /// @param vertices    how many place() is called with
-  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices);
+  /// @param workspace   shared with others that do not use it between place() and interpolate()
+  Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
+           std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
+  /// The vertices are others from now on.
+  void take_up(const SurfaceSet& set);
   /// Find the vertices' positions x [vertex, 3], um, in the grid. Must precede the calls below.
   /// @returns the lowest vertex that is outside the grid on this rank, or -1
   int place(const Components<double>& x);
@@ -28,12 +35,17 @@ class Transfer {
   void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                    const Components<double>& velocity);
   /// What the slip of a membrane depends on, with this kernel's law.
+  /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                 const Array<double>& chi = {}) const;
+                 const Array<double>& gap = {}) const;
 
-  /// Vertices that lie in this rank's own cells, after place(). Over all ranks all of them do.
+  /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
+  /// The widest spacing of this rank's block, um.
+  double largest_spacing() const { return largest_spacing_; }
   int markers() const { return markers_.count; }
+  /// Of the sphere that moves as a vertex alone, spacings.
+  double marker_radius() const;
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
   const MarkerSearch& search() const { return search_; }
@@ -41,6 +53,7 @@ class Transfer {
 
  private:
   void prepare_sharpening();
+  void make_places(int vertices);
   void make_room(int markers);
   template <class Use>
   void with_kernel(const Use& use) const;
@@ -52,7 +65,9 @@ class Transfer {
   VertexPlaces places_;
   HostCopy<Array<int>> beyond_host_;
   MarkerViews markers_;
+  std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
+  double largest_spacing_ = 0;
   FaceForce faces_;
   double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing
   Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then

@@ -1,6 +1,7 @@
 // Scenes for the tests of coupled runs, built in code.
 #pragma once
 
+#include "cells/shared_cells.hpp"
 #include "coupling/flow_simulation.hpp"
 
 #include <cmath>
@@ -56,6 +57,22 @@ inline Case tube_with_cell(int n, int nk, double mass_pg, CouplingSettings::Sche
   scene.coupling = CouplingSettings{};
   scene.coupling->scheme = scheme;
   return scene;
+}
+
+/// Positions of every cell's vertices, moved on by the periods that it has been moved back, on every rank.
+inline std::vector<double> positions(FlowSimulation& simulation) {
+  const SharedCells& cells = *simulation.shared_cells();
+  std::vector<double> all(3 * cells.total_vertices(), 0.0);
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().x);
+  int vertex = 0;
+  for (const CellRecord& cell : cells.own()) {
+    const Triple travelled = cells.wrapped_by(cell);
+    const int count = static_cast<int>(cells.membranes().types()[cell.type].mesh.vertices.size());
+    for (int i = 0; i < count; ++i, ++vertex)
+      for (int d = 0; d < 3; ++d) all[3 * (cell.first_vertex + i) + d] = x(vertex, d) + travelled[d];
+  }
+  simulation.grid().comm().sum(all.data(), static_cast<int>(all.size()));
+  return all;
 }
 
 }  // namespace corpuscle::scenes

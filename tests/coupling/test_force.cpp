@@ -54,7 +54,7 @@ Run run(const Case& scene) {
     energy.sample(simulation.membranes()->diagnostics()[0].energy_fJ());
   }
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), simulation.surfaces()->x);
-  for (std::size_t i = 0; i < x.extent(0); ++i)
+  for (int i = 0; i < simulation.surfaces()->own_vertices; ++i)
     for (int m = 0; m < 3; ++m) result.x.push_back(x(i, m));
   result.cell = simulation.membranes()->diagnostics()[0];
   result.wrapped = simulation.coupling()->wrapped_by()[0];
@@ -190,22 +190,3 @@ TEST_CASE("a cell beyond a wall is refused by name", "[coupling][force]") {
   CHECK(text.find("cells.0") != std::string::npos);
   CHECK(text.find("outside the grid") != std::string::npos);
 }
-
-#ifdef CORPUSCLE_MPI
-TEST_CASE("forces and velocities pass between ranks as they do within one", "[coupling][force][ranks]") {
-  if (Comm().size() == 1) return;
-  Case scene = sheared_cell(10, 300, true);
-  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
-  scene.cells[0].center_um = {4.8, 0.1, -4.7};  // over two sides and the planes between ranks
-  if (GENERATE(false, true)) scene.cells[0].viscosity_ratio = 5, scene.cells[0].membrane_viscosity_N_s_per_m = 5e-7;
-  Timers timers;
-  FlowSimulation alone(Comm(MPI_COMM_SELF), scene, timers), shared(Comm(), scene, timers);
-  while (!alone.done()) alone.step(), shared.step();
-  const auto a = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), alone.surfaces()->x);
-  const auto b = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), shared.surfaces()->x);
-  double most = 0;
-  for (std::size_t i = 0; i < a.extent(0); ++i)
-    for (int m = 0; m < 3; ++m) most = std::max(most, std::abs(a(i, m) - b(i, m)));
-  CHECK(most < 1e-9);  // um: round-off, and the solvers' last residuals
-}
-#endif

@@ -182,3 +182,104 @@ TEST_CASE("a small level is solved directly, whatever is periodic, pinned, cut o
   // Single precision of coefficients and values of up to about 30, and what is cut off is compatible to that only.
   CHECK(left < 1e-4);
 }
+
+#ifdef CORPUSCLE_MPI
+namespace {
+
+/// The cycles of the pressure and of the velocity on a box with a body.
+struct Cycles {
+  Cycles(const Comm& comm, const std::array<int, 3>& cells, const Triple& upper, const std::array<bool, 3>& periodic)
+      : grid(comm, make_node_source(box(cells, upper)), periodic) {}
+
+  Grid grid;
+  std::unique_ptr<MultigridHierarchy> hierarchy;
+  std::unique_ptr<PressureCycle> pressure;
+  std::unique_ptr<MultigridCycle<Components<CycleReal>>> velocity;
+};
+
+PressureMask around_body(Grid& grid) {
+  const IndexSpace index = grid.index();
+  const Array<std::int8_t> open("corpuscle::test::open", index.size());
+  const PressureMask mask("corpuscle::test::mask", index.size());
+  const int wide = index.global[0] / 4, middle = index.global[2] / 2;
+  for_owned("corpuscle::test::open", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int at = index.first[2] + k, across = index.first[0] + i;
+    open(index.cell(i, j, k)) = at >= middle - 1 && at <= middle + 1 && across >= wide && across < 3 * wide ? 0 : 1;
+  });
+  grid.halo().exchange(open);
+  Kokkos::parallel_for("corpuscle::test::mask", Policy(0, index.size()), KOKKOS_LAMBDA(int c) { mask(c) = open(c); });
+  return mask;
+}
+
+/// Depends on where a cell is in the whole grid.
+void fill(const IndexSpace& index, const PressureMask& mask, const Array<CycleReal>& b, const Components<CycleReal>& u) {
+  for_owned("corpuscle::test::right_hand_side", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k), a = index.first[0] + i, e = index.first[1] + j, f = index.first[2] + k;
+    b(c) = mask(c) ? std::sin(0.9f * a + 0.3f * e) + std::cos(1.1f * e - 0.7f * f) : 0.0f;
+    for (int m = 0; m < 3; ++m) u(c, m) = mask(c) ? std::sin(0.4f * a + 0.5f * e + 0.2f * f + m) : 0.0f;
+  });
+}
+
+std::unique_ptr<Cycles> make_cycles(const Comm& comm, const std::array<int, 3>& cells, const Triple& upper,
+                                    const std::array<bool, 3>& periodic) {
+  auto owner = std::make_unique<Cycles>(comm, cells, upper, periodic);
+  Cycles& made = *owner;
+  const IndexSpace& index = made.grid.index();
+  ViscousCoefficients g;
+  for (auto& normal : g.normal) normal = Array<double>("corpuscle::test::normal", index.size());
+  viscous_coefficients<false>(made.grid.views(), g);
+  const PressureMask mask = around_body(made.grid);
+  made.hierarchy = std::make_unique<MultigridHierarchy>(made.grid, g.normal);
+  made.hierarchy->update(mask);
+  made.pressure = std::make_unique<PressureCycle>(*made.hierarchy);
+  made.pressure->update(comm.root() ? index.cell(0, 0, 0) : -1);
+  made.velocity = std::make_unique<MultigridCycle<Components<CycleReal>>>(*made.hierarchy, Smoothing{2, 0.5, 2.0});
+  auto& finest = made.velocity->levels()[0];
+  Kokkos::deep_copy(finest.own, 0.2f);
+  made.velocity->update();
+  fill(index, mask, made.pressure->finest().b, finest.b);
+  return owner;
+}
+
+/// Largest difference of this rank's values from those of the whole grid, over the largest of these.
+template <class Value>
+double difference(const IndexSpace& part, const IndexSpace& whole, const Value& mine, const Value& all) {
+  double most = 0, size = 1e-30;
+  for (int k = 0; k < part.n[2]; ++k)
+    for (int j = 0; j < part.n[1]; ++j)
+      for (int i = 0; i < part.n[0]; ++i) {
+        const int c = whole.cell(part.first[0] + i, part.first[1] + j, part.first[2] + k);
+        most = larger(most, std::abs(double(mine.data()[part.cell(i, j, k)]) - all.data()[c]));
+        size = larger(size, std::abs(double(all.data()[c])));
+      }
+  return most / size;
+}
+
+}  // namespace
+
+TEST_CASE("a multigrid cycle is that of one rank however the grid is cut", "[fluid][ranks]") {
+  using Bool = std::array<bool, 3>;
+  for (const auto& [cells, upper, periodic] :
+       {std::tuple<std::array<int, 3>, Triple, Bool>{{24, 20, 32}, {6, 5, 8}, {false, false, false}},
+        {{23, 19, 33}, {6, 5, 24}, {false, false, true}},   // pairs that two ranks share
+        {{26, 22, 50}, {6, 5, 24}, {true, false, false}},
+        {{14, 16, 18}, {3, 3, 3}, {true, true, true}},
+        {{40, 42, 44}, {3, 3, 3}, {false, true, false}}}) {  // more than one level below the finest is cut
+    INFO(cells[0] << " x " << cells[1] << " x " << cells[2] << " cells");
+    auto shared = make_cycles(Comm(), cells, upper, periodic), alone = make_cycles(Comm::alone(), cells, upper, periodic);
+    const auto& levels = shared->hierarchy->levels();
+    REQUIRE(levels.size() == alone->hierarchy->levels().size());
+    CHECK(levels.back().comm.size() == 1);  // solved directly
+    const IndexSpace &part = shared->grid.index(), &whole = alone->grid.index();
+    shared->pressure->run(), alone->pressure->run();
+    // Round-off of single precision, since sums of a cell's terms may be contracted in other ways.
+    CHECK(difference(part, whole, shared->pressure->finest().x, alone->pressure->finest().x) < 1e-5);
+    for (int depth = 0; depth < static_cast<int>(levels.size()); ++depth) {
+      shared->velocity->run(depth), alone->velocity->run(depth);
+      const auto mine = shared->velocity->levels()[0].x, all = alone->velocity->levels()[0].x;
+      for (int m = 0; m < 3; ++m)
+        CHECK(difference(part, whole, Kokkos::subview(mine, Kokkos::ALL, m), Kokkos::subview(all, Kokkos::ALL, m)) < 1e-5);
+    }
+  }
+}
+#endif

@@ -174,7 +174,12 @@ TEST_CASE("keys without effect on membranes that are forces are remarked upon") 
   REQUIRE(scene.remarks[1].rfind("cells.0.interior = \"empty\" has no effect", 0) == 0);
   require_same(scene, read_echo(scene));
   const auto typed = typed_case({"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cell_types.1.mass_pg=30"});
-  REQUIRE(typed.remarks.size() == 2);
+  REQUIRE(typed.remarks.size() == 3);
+  REQUIRE(typed.remarks[2].find("cells and no [contact]") != std::string::npos);
+  const auto touching =
+      typed_case({"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cell_types.1.mass_pg=30", "contact.range_um=0.3"});
+  REQUIRE(touching.remarks.size() == 2);
+  REQUIRE(touching.contact->range_um == 0.3);
   REQUIRE(typed.remarks[0].rfind("cell_types.1.mass_pg = 30 (and 1 more) has no effect", 0) == 0);
 }
 

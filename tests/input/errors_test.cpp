@@ -272,7 +272,18 @@ TEST_CASE("cells and bodies are checked") {
   }
   require_parts(message(replaced(flow, "[fluid]\n", "[fluid]\n[[cells]]\ncenter_um = [1e300, 0, 0]\n")),
                 {":11: cells.0.center_um = [1e+300, 0, 0]", "each a number from -1"});
-  require_parts(cell("[contact]"), {":12: contact: contact forces do not exist yet"});
+  require_parts(cell("[contact]"), {":12: contact", "coupling.scheme = \"force\""});
+  const std::string touching = "[contact]\n[coupling]\nscheme = \"force\"\n";
+  REQUIRE(cell("push_nN = [0, 0, 1]\n" + touching) == "accepted");
+  const auto contact = [&](const std::string& key) { return cell("[coupling]\nscheme = \"force\"\n[contact]\n" + key); };
+  REQUIRE(contact("range_um = 0.3\naggregation_energy_fJ_per_um2 = 1e-3\naggregation_range_um = 0.5") == "accepted");
+  require_parts(contact("range_um = 0"), {":15: contact.range_um = 0", "from 0.01 to 2"});
+  require_parts(contact("pressure_Pa = -1"), {":15: contact.pressure_Pa = -1", "above 0"});
+  require_parts(contact("aggregation_range_um = 0.5"), {":15: contact.aggregation_range_um", "only with aggregation_energy_fJ_per_um2"});
+  require_parts(contact("aggregation_energy_fJ_per_um2 = 1e-3\naggregation_range_um = 0.2"),
+                {":16: contact.aggregation_range_um", "1.2 times range_um"});
+  require_parts(contact("pressure_kPa = 1"), {":15: contact.pressure_kPa", "did you mean 'pressure_Pa'?"});
+  require_parts(cell("push_nN = [0, 0, 1]"), {":12: cells.0.push_nN", "coupling.scheme = \"force\""});
 
   const auto body = [](const std::string& text) {
     return message(replaced(flow, "[fluid]\n", "[fluid]\n[[bodies]]\ncenter_um = [2, 2, 2]\n" + text + "\n"));

@@ -31,7 +31,9 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
      {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
     {"viscosity ratio", {"corpuscle::transfer::inside", "corpuscle::fluid::excess_dissipation"}},
-    {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict"}},
+    {"contact", {"corpuscle::contact::"}},
+    {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
+                  "corpuscle::cells::measure_boxes"}},
     {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
     {"field output", {"corpuscle::output::gather"}},
 };
@@ -202,6 +204,9 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   }
   SECTION("straight tube, membranes as forces, and cytosol") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cells.0.viscosity_ratio=5"});
+  }
+  SECTION("straight tube, membranes as forces that touch") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "contact.range_um=0.25"}, 3);
   }
   SECTION("straight tube with two cells") { check_flow("straight_tube", {tube}, 10); }
   SECTION("straight tube, least of everything") {

@@ -36,7 +36,8 @@ struct Drop : HeldSurface {
       : HeldSurface(cube_of(cells, length), boundaries, settings,
                     ellipsoid_mesh({1, 1, 1}, {0.03, -0.02, 0.01}, 0.7 * length / cells),
                     CouplingSettings::Kernel::three_point),
-        cytosol(grid, {ratio}) {
+        cytosol(grid, {ratio}),
+        kinds{Array<int>("corpuscle::test::type", 1), Table<int>("corpuscle::test::turns", 1, 3)} {
     if (ratio != 1) fluid.set_viscosity(cytosol.relative_viscosity(), cytosol.least(), cytosol.fluidity());
   }
 
@@ -61,7 +62,7 @@ struct Drop : HeldSurface {
     pull(tension);
     transfer.place(surface.x);
     transfer.spread(force);
-    cytosol.update(transfer, surface);
+    cytosol.update(transfer, surface, kinds);
     fluid.begin_step(dt);
     fluid.solve(time + dt, nullptr);
     take_velocity(false);
@@ -72,6 +73,7 @@ struct Drop : HeldSurface {
   }
 
   Cytosol cytosol;
+  BodyKinds kinds;
 };
 
 }  // namespace
@@ -108,7 +110,7 @@ TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
   Drop drop(24, length, all, settings, ratio);
   drop.set_force([&](const Vec3& x, const Vec3& area) { return (buoyancy * x.z) * area; });
   drop.transfer.place(drop.surface.x);
-  drop.cytosol.update(drop.transfer, drop.surface);
+  drop.cytosol.update(drop.transfer, drop.surface, drop.kinds);
   drop.settle(12, 2);
   const auto v = on_host(drop.velocity);
   const auto x = on_host(drop.surface.x), n = on_host(drop.surface.normal);

@@ -6,6 +6,7 @@
 #include "../fluid/fluid_fixture.hpp"
 #include "held_surface.hpp"
 #include "immersed/surface_work.hpp"
+#include "cells/rank_blocks.hpp"
 #include "transfer/cytosol.hpp"
 
 using namespace corpuscle;
@@ -29,15 +30,36 @@ struct Inside {
   Inside(Comm comm, const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries,
          const std::vector<TriangleMesh>& meshes, std::vector<double> ratios = {})
       : grid(comm, nodes, periodic(boundaries)),
-        surfaces(make_surface_set(meshes)),
+        surfaces(make_surface_set(with_copies(meshes))),
         transfer(grid, boundaries, three_point, surfaces.vertices),
         cytosol(grid, ratios.empty() ? std::vector<double>(meshes.size(), 2) : ratios) {
-    enclosed = enclosed_volume(surfaces);
+    enclosed = enclosed_volume(make_surface_set(meshes));
+    const auto turns = period_turns(grid);
+    kinds = {Array<int>("corpuscle::test::type", surfaces.bodies), Table<int>("corpuscle::test::turns", surfaces.bodies, 3)};
+    const auto type = Kokkos::create_mirror_view(kinds.type);
+    const auto of_body = Kokkos::create_mirror_view(kinds.turns);
+    for (int b = 0; b < surfaces.bodies; ++b) {
+      type(b) = b / static_cast<int>(turns.size());
+      for (int d = 0; d < 3; ++d) of_body(b, d) = turns[b % turns.size()][d];
+    }
+    Kokkos::deep_copy(kinds.type, type);
+    Kokkos::deep_copy(kinds.turns, of_body);
+  }
+
+  /// Each with all that are beyond periodic sides.
+  std::vector<TriangleMesh> with_copies(const std::vector<TriangleMesh>& meshes) const {
+    std::vector<TriangleMesh> all;
+    for (const TriangleMesh& mesh : meshes)
+      for (const Vec3& shift : period_shifts(grid)) {
+        all.push_back(mesh);
+        for (Triple& p : all.back().vertices) p = {p[0] + shift.x, p[1] + shift.y, p[2] + shift.z};
+      }
+    return all;
   }
 
   void update() {
     transfer.place(surfaces.x);
-    cytosol.update(transfer, surfaces);
+    cytosol.update(transfer, surfaces, kinds);
     fraction = on_host(cytosol.relative_viscosity());
     const auto volume = on_host(grid.views().volume);
     inside = least = most = 0;
@@ -65,6 +87,7 @@ struct Inside {
   SurfaceSet surfaces;
   Transfer transfer;
   Cytosol cytosol;
+  BodyKinds kinds;
   HostMirror<Array<double>> fraction;
   double enclosed = 0, inside = 0, least = 0, most = 0;
 };

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "../fluid/fluid_fixture.hpp"
+#include "cells/rank_blocks.hpp"
 #include "transfer/delta.hpp"
 
 using namespace corpuscle;
@@ -233,15 +234,20 @@ TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]"
   Grid grid(comm, sheared_box({8, 6, 7}), {true, true, true});
   const IndexSpace& index = grid.index();
   const auto all = sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
-  const auto force = points(1, [](int) { return Triple{1, -2, 0.5}; });
+  // The point and its copies beyond the periodic sides.
+  const auto shifts = period_shifts(grid);
+  const int copies = static_cast<int>(shifts.size());
+  REQUIRE(copies == 27);
+  const auto force = points(copies, [](int) { return Triple{1, -2, 0.5}; });
   const int d = GENERATE(0, 1, 2);
   std::vector<double> first;
-  Transfer transfer(grid, all, Kernel::three_point, 1);
+  Transfer transfer(grid, all, Kernel::three_point, copies);
   for (int step = -2; step < index.n[d] + 2; ++step) {
     double s[3] = {0.61, 0.83, 0.37};
     s[d] = 2 * (step + 0.13) / index.n[d];
-    REQUIRE(transfer.place(points(1, [&](int) {
-      return Triple{s[0] + 0.3 * s[1], s[1] + 0.2 * s[2], s[2] + 0.15 * s[0]};
+    REQUIRE(transfer.place(points(copies, [&](int copy) {
+      const Vec3& by = shifts[copy];
+      return Triple{s[0] + 0.3 * s[1] + by.x, s[1] + 0.2 * s[2] + by.y, s[2] + 0.15 * s[0] + by.z};
     })) == -1);
     CHECK(transfer.at_home() == 1);
     transfer.spread(force);
@@ -259,10 +265,14 @@ TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]"
     if (first.empty()) first = line;
     for (int c = 0; c < index.n[d]; ++c) CHECK(line[c] == Approx(first[c]).margin(1e-10));
     const auto uniform = make_field(grid, [](const Triple&) { return Triple{1, 2, 3}; });
-    Components<double> v("corpuscle::test::v", 1, 3);
+    Components<double> v("corpuscle::test::v", copies, 3);
     transfer.interpolate(uniform.flux, uniform.u, nullptr, v);
     const auto u = on_host(v);
-    for (int m = 0; m < 3; ++m) CHECK(u(0, m) == Approx(1 + m).epsilon(1e-12));
+    for (int m = 0; m < 3; ++m) {
+      double sum = 0;
+      for (int copy = 0; copy < copies; ++copy) sum += u(copy, m);
+      CHECK(sum == Approx(1 + m).epsilon(1e-12));
+    }
   }
 }
 

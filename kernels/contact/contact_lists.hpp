@@ -1,0 +1,135 @@
+// Which triangles may touch which vertices, found through bins.
+#pragma once
+
+#include <string>
+
+#include "contact/contact_views.hpp"
+#include "contact/triangle_bins.hpp"
+#include "immersed/triangle.hpp"
+
+namespace corpuscle {
+
+KOKKOS_INLINE_FUNCTION double distance_to(const Vec3& p, const Corners& k) {
+  const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+  return norm(p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c));
+}
+
+/// Whether a triangle has a corner that is at most two edges away from a vertex: a sheet that buckles at the mesh's own
+/// scale does not touch itself.
+KOKKOS_INLINE_FUNCTION bool within_two_rings(const SurfaceSet& s, int v, int t) {
+  const int a = s.triangle(t, 0), b = s.triangle(t, 1), c = s.triangle(t, 2);
+  for (int r = s.ring_start(v); r < s.ring_start(v + 1); ++r) {
+    const int u = s.triangle(s.ring_triangle(r), (s.ring_corner(r) + 1) % 3);
+    for (int q = s.ring_start(u); q < s.ring_start(u + 1); ++q)
+      for (int corner = 0; corner < 3; ++corner) {
+        const int w = s.triangle(s.ring_triangle(q), corner);
+        if (w == a || w == b || w == c) return true;
+      }
+  }
+  return false;
+}
+
+/// What the search of lists reads.
+struct ContactSearch {
+  SurfaceSet surface;
+  Images images;
+  TriangleBins bins;
+  ContactRest rest;
+  ContactReach reach;  // with the skin
+
+  /// Whether a triangle under an image, whose vertices are at k, is one of vertex v's, which is at p.
+  KOKKOS_INLINE_FUNCTION bool belongs(int v, const Vec3& p, int m, int t) const {
+    const SurfaceSet& s = surface;
+    const int body = s.vertex_body(v), other = s.triangle_body(t);
+    const bool own = m == 0 && body == other;
+    if (!own && body >= s.cells && other >= s.cells) return false;
+    if (own && body >= s.cells) return false;
+    const Corners k = corners(s, t, {});
+    const double far = own ? reach.own : reach.other, most = far + bins.radius;
+    const Vec3 from_centre = p - centre_of(k);
+    if (dot(from_centre, from_centre) > most * most || distance_to(p, k) > far) return false;
+    if (!own) return true;
+    if (within_two_rings(s, v, t)) return false;
+    const Corners at_rest{load(rest.x, s.triangle(t, 0)), load(rest.x, s.triangle(t, 1)),
+                          load(rest.x, s.triangle(t, 2))};
+    return distance_to(load(rest.x, v), at_rest) >= reach.apart;
+  }
+
+  /// use(item) for all of vertex v's items, in no particular order.
+  template <class Use>
+  KOKKOS_INLINE_FUNCTION void visit(int v, const Use& use) const {
+    for (int m = 0; m < images.count; ++m) {
+      const Vec3 p = load(surface.x, v) + images.shift[m];
+      int low[3], high[3];
+      bool near = true;
+      for (int d = 0; d < 3; ++d) {
+        low[d] = bins.along(d, p[d]) - 1;
+        high[d] = low[d] + 2;
+        low[d] = low[d] < 0 ? 0 : low[d];
+        high[d] = high[d] > bins.n[d] - 1 ? bins.n[d] - 1 : high[d];
+        near = near && low[d] <= high[d];
+      }
+      if (!near) continue;
+      for (int k = low[2]; k <= high[2]; ++k)
+        for (int j = low[1]; j <= high[1]; ++j)
+          for (int e = bins.start(bins.bin(low[0], j, k)); e < bins.start(bins.bin(high[0], j, k) + 1); ++e)
+            if (belongs(v, p, m, bins.order(e))) use(m * surface.triangles + bins.order(e));
+    }
+  }
+};
+
+/// From numbers to the first of each vertex, in place, over [vertex + 1]. @returns their sum
+inline int numbers_to_starts(const std::string& label, const Array<int>& numbers, int vertices) {
+  const auto first = numbers;
+  int total = 0;
+  Kokkos::parallel_scan(
+      label, Policy(0, vertices + 1),
+      KOKKOS_LAMBDA(int v, int& sum, bool last) {
+        const int own = v < vertices ? first(v) : 0;
+        if (last) first(v) = sum;
+        sum += own;
+      },
+      total);
+  return total;
+}
+
+/// lists.first, and how many items there are.
+inline int count_items(const ContactSearch& search, const ContactLists& lists) {
+  const ContactSearch s = search;
+  const auto first = lists.first;
+  const int vertices = s.surface.vertices;
+  Kokkos::parallel_for(
+      "corpuscle::contact::count_items", Policy(0, vertices), KOKKOS_LAMBDA(int v) {
+        int count = 0;
+        s.visit(v, [&](int) { ++count; });
+        first(v) = count;
+      });
+  return numbers_to_starts("corpuscle::contact::first_items", first, vertices);
+}
+
+/// lists.item, in order, and how many groups each vertex has, in first_group.
+inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
+  const ContactSearch s = search;
+  const ContactLists out = lists;
+  Kokkos::parallel_for(
+      "corpuscle::contact::fill_items", Policy(0, s.surface.vertices), KOKKOS_LAMBDA(int v) {
+        const int begin = out.first(v);
+        int end = begin;
+        s.visit(v, [&](int item) {
+          int to = end++;
+          for (; to > begin && out.item(to - 1) > item; --to) out.item(to) = out.item(to - 1);
+          out.item(to) = item;
+        });
+        int groups = 0;
+        for (int e = begin; e < end; ++e)
+          if (e == begin || !same_group(s.surface, out.item(e - 1), out.item(e))) ++groups;
+        out.first_group(v) = groups;
+      });
+}
+
+/// From numbers to first_group. @returns how many groups there are
+inline int number_groups(const ContactLists& lists, int vertices) {
+  return numbers_to_starts("corpuscle::contact::first_groups", lists.first_group, vertices);
+}
+
+}  // namespace corpuscle

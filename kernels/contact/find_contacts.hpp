@@ -1,0 +1,119 @@
+// The nearest point of every body that is near a vertex, with the sign of the gap.
+#pragma once
+
+#include "common/extremes.hpp"
+#include "contact/contact_lists.hpp"
+
+namespace corpuscle {
+
+KOKKOS_INLINE_FUNCTION Vec3 unit_normal(const SurfaceSet& s, int t) {
+  const Corners k = corners(s, t, {});
+  const Vec3 n = cross(k.b - k.a, k.c - k.a);
+  const double length = norm(n);
+  return (length > 0 ? 1 / length : 0) * n;
+}
+
+/// Outward at a point of triangle t: has the right sign for any point whose closest surface point it is (Baerentzen &
+/// Aanaes, IEEE Trans. Vis. Comput. Graph. 11, 2005).
+KOKKOS_INLINE_FUNCTION Vec3 outward_at(const SurfaceSet& s, int t, int feature) {
+  if (feature == 0) return unit_normal(s, t);
+  if (feature <= 3) return unit_normal(s, t) + unit_normal(s, s.neighbour(t, feature - 1));
+  const int v = s.triangle(t, feature - 4);
+  Vec3 sum;
+  for (int r = s.ring_start(v); r < s.ring_start(v + 1); ++r) {
+    const int ring = s.ring_triangle(r), corner = s.ring_corner(r);
+    const Vec3 at = load(s.x, v), p = load(s.x, s.triangle(ring, (corner + 1) % 3)) - at,
+               q = load(s.x, s.triangle(ring, (corner + 2) % 3)) - at;
+    sum += std::atan2(norm(cross(p, q)), dot(p, q)) * unit_normal(s, ring);
+  }
+  return sum;
+}
+
+/// Nearest so far among a group.
+struct Nearest {
+  double square = 1e300;  // of the distance, um2
+  int item = -1;
+  TrianglePoint at{};
+};
+
+/// Stores a group's nearest point: of another body's the gap is positive outside, of the own one everywhere.
+KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bool own, const Nearest& best,
+                                          const ContactViews& c, int g) {
+  const int t = item_triangle(s, best.item);
+  const Corners k = corners(s, t, {});
+  const Vec3 away = p - (best.at.weight[0] * k.a + best.at.weight[1] * k.b + best.at.weight[2] * k.c);
+  const double distance = norm(away);
+  const Vec3 outward = outward_at(s, t, best.at.feature);
+  const bool inside = dot(away, outward) < 0;
+  // On the surface itself the direction is the surface's.
+  const double length = norm(outward);
+  const Vec3 along =
+      distance > 1e-9 ? (1 / distance) * away : (length > 0 ? (inside ? -1.0 : 1.0) / length : 0.0) * outward;
+  const double sign = inside && !own ? -1 : 1;
+  c.item(g) = best.item;
+  c.gap(g) = sign * distance;
+  for (int d = 0; d < 3; ++d) {
+    c.weight(g, d) = best.at.weight[d];
+    c.normal(g, d) = sign * along[d];
+  }
+}
+
+/// Fills item, gap, weight and normal of the contacts, at the surfaces' present positions, for groups within reach
+/// (without the skin). What is found does not depend on what else is in the lists.
+inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts, const ContactReach& far,
+                          const ContactLists& lists, const ContactViews& contacts) {
+  const SurfaceSet s = surface;
+  const Images images = image_shifts;
+  const ContactReach reach = far;
+  const ContactLists in = lists;
+  const ContactViews out = contacts;
+  Kokkos::parallel_for(
+      "corpuscle::contact::find_contacts", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
+        const Vec3 here = load(s.x, v);
+        int g = in.first_group(v);
+        for (int e = in.first(v); e < in.first(v + 1);) {
+          const int first = in.item(e);
+          const Vec3 p = here + images.shift[item_image(s, first)];
+          Nearest best;
+          for (; e < in.first(v + 1) && same_group(s, first, in.item(e)); ++e) {
+            const Corners k = corners(s, item_triangle(s, in.item(e)), {});
+            const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+            const Vec3 r = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
+            const double square = dot(r, r);
+            if (square < best.square) best = {square, in.item(e), at};
+          }
+          const bool own = same_body(s, v, first);
+          const double most = own ? reach.own : reach.other;
+          if (best.square < most * most)
+            store_contact(s, p, own, best, out, g);
+          else
+            out.item(g) = -1;
+          ++g;
+        }
+      });
+}
+
+/// gap [vertex] to the nearest other body, um; `none` where there is none within reach.
+inline void gaps_to_others(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
+                           double none, const Array<double>& gap) {
+  const SurfaceSet s = surface;
+  const ContactLists in = lists;
+  const ContactViews c = contacts;
+  Kokkos::parallel_for(
+      "corpuscle::contact::gaps", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
+        double least = none;
+        for (int g = in.first_group(v); g < in.first_group(v + 1); ++g)
+          if (c.item(g) >= 0 && !same_body(s, v, c.item(g)) && c.gap(g) < least) least = c.gap(g);
+        gap(v) = least;
+      });
+}
+
+inline double least_of(const Array<double>& gap) {
+  double least = 1e30;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::least_gap", Policy(0, static_cast<int>(gap.extent(0))),
+      KOKKOS_LAMBDA(int v, double& sum) { sum = smaller(sum, gap(v)); }, Smallest(least));
+  return least;
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,173 @@
+// Gaps that must not close: a limit on how much of a gap one step may take away, and the way back for what has crossed.
+#pragma once
+
+#include "common/extremes.hpp"
+#include "common/sums.hpp"
+#include "contact/find_contacts.hpp"
+
+namespace corpuscle {
+
+/// What a correction of the contacts aims at.
+struct GapGoal {
+  double share = 0;        // of the gap as it was found; 0: only contacts that have crossed are looked at
+  double least = 0;        // um, whatever it was
+  double relax = 1;        // share of what is missing that is made up at once: several contacts push the same corner
+  int cells_vertices = 0;  // vertices that can move
+};
+
+/// What the gaps of a move fall short of.
+struct Shortfall {
+  double most = 0;      // over the goal itself
+  int limited = 0;      // contacts below their goal
+  int through = 0;      // of them, those whose vertex is on the wrong side
+  int first = 1 << 30;  // the lowest of these
+
+  template <class Other>
+  KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
+    most = larger(most, b.most);
+    limited = limited + b.limited;
+    through = through + b.through;
+    if (b.first < first) first = b.first;
+  }
+  KOKKOS_INLINE_FUNCTION Shortfall& operator+=(const Shortfall& b) {
+    join(b);
+    return *this;
+  }
+  KOKKOS_INLINE_FUNCTION void operator+=(const volatile Shortfall& b) volatile { join(b); }
+};
+
+/// push: the way by which vertex and corners must move for the gap, along the normal as it was found, to be at least
+/// the goal.
+/// @param counted  of the first so many vertices contacts count
+inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
+                                 const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted) {
+  const SurfaceSet s = surface;
+  const Images images = image_shifts;
+  const GapGoal goal = gap_goal;
+  const auto first = lists.first_group;
+  const ContactViews c = contacts;
+  Shortfall all;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::gap_corrections", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, Shortfall& sum) {
+        for (int g = first(v); g < first(v + 1); ++g) {
+          c.push(g) = 0;
+          if (c.item(g) < 0 || c.gap(g) >= range || (goal.share == 0 && c.gap(g) >= 0)) continue;
+          const int t = item_triangle(s, c.item(g));
+          const Corners k = corners(s, t, {});
+          const Vec3 foot = c.weight(g, 0) * k.a + c.weight(g, 1) * k.b + c.weight(g, 2) * k.c;
+          const double now = dot(load(s.x, v) + images.shift[item_image(s, c.item(g))] - foot, load(c.normal, g));
+          const double kept = goal.share * c.gap(g), wanted = kept > goal.least ? kept : goal.least;
+          if (now >= wanted) continue;
+          double mobility = v < goal.cells_vertices ? 1 : 0;
+          for (int d = 0; d < 3; ++d)
+            if (s.triangle(t, d) < goal.cells_vertices) mobility += c.weight(g, d) * c.weight(g, d);
+          c.push(g) = goal.relax * (wanted - now) / mobility;
+          Shortfall own;
+          own.most = (wanted - now) / wanted;
+          if (v < counted) own.limited = 1;
+          if (v < counted && now < 0) own.through = 1, own.first = g;
+          sum += own;
+        }
+      },
+      all);
+  return all;
+}
+
+/// Whether two triangles share a vertex.
+KOKKOS_INLINE_FUNCTION bool adjacent(const SurfaceSet& s, int t, int other) {
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b)
+      if (s.triangle(t, a) == s.triangle(other, b)) return true;
+  return false;
+}
+
+struct CrossingCount {
+  int vertices = 0;     // on the wrong side
+  int first = 1 << 30;  // the lowest contact of them
+  double deepest = 0;   // um
+
+  template <class Other>
+  KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
+    vertices = vertices + b.vertices;
+    if (b.first < first) first = b.first;
+    if (b.deepest > deepest) deepest = b.deepest;
+  }
+  KOKKOS_INLINE_FUNCTION CrossingCount& operator+=(const CrossingCount& b) {
+    join(b);
+    return *this;
+  }
+  KOKKOS_INLINE_FUNCTION void operator+=(const volatile CrossingCount& b) volatile { join(b); }
+};
+
+/// Contacts on the wrong side: inside another body, or beyond the own surface where the vertex was on the other side of
+/// the same place when it was last looked at; those are turned round, so that their gap is negative as well.
+/// @param side  [vertex] on which it saw its own body last, kept from call to call: triangle * 2 + 1 outside, triangle * 2 inside;
+///              -1 where nothing was within reach
+/// @param counted  of the first so many vertices crossings count
+inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
+                                    const Array<int>& side, int counted) {
+  const SurfaceSet s = surface;
+  const auto first = lists.first_group;
+  const ContactViews c = contacts;
+  CrossingCount count;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::find_crossings", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, CrossingCount& sum) {
+        int seen = -1;
+        for (int g = first(v); g < first(v + 1); ++g) {
+          if (c.item(g) < 0) continue;
+          if (same_body(s, v, c.item(g))) {
+            const int t = c.item(g), last = side(v);
+            const double across = dot(load(c.normal, g), unit_normal(s, t));
+            if (std::fabs(across) < 0.5) continue;  // beside the place rather than over it
+            const bool outside = across > 0;
+            seen = 2 * t + (outside ? 1 : 0);
+            if (last >= 0 && outside != (last % 2 == 1) && adjacent(s, t, last / 2)) {
+              seen = 2 * t + last % 2;
+              c.gap(g) = -c.gap(g);
+              for (int d = 0; d < 3; ++d) c.normal(g, d) = -c.normal(g, d);
+            }
+          }
+          if (c.gap(g) < 0 && v < counted) {
+            CrossingCount own;
+            own.vertices = 1;
+            own.first = g;
+            own.deepest = -c.gap(g);
+            sum += own;
+          }
+        }
+        side(v) = seen;
+      },
+      count);
+  return count;
+}
+
+/// Whether the lists still hold: largest way that a vertex has gone since they were made, beyond the mean of all, plus
+/// the way of one step ahead.
+inline double largest_way(const SurfaceSet& surface, const Components<double>& listed, double dt) {
+  const SurfaceSet s = surface;
+  Sums<6> mean;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::mean_way", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, Sums<6>& sum) {
+        for (int d = 0; d < 3; ++d) {
+          sum[d] += s.x(v, d) - listed(v, d);
+          sum[3 + d] += s.v(v, d);
+        }
+      },
+      mean);
+  const double share = 1.0 / s.vertices;
+  const Vec3 way = share * Vec3{mean[0], mean[1], mean[2]}, speed = share * Vec3{mean[3], mean[4], mean[5]};
+  double most = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::largest_way", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, double& worst) {
+        const double own = norm(load(s.x, v) - load(listed, v) - way) + dt * norm(load(s.v, v) - speed);
+        worst = larger(worst, own);
+      },
+      Largest(most));
+  return most;
+}
+
+}  // namespace corpuscle

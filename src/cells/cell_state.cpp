@@ -1,0 +1,86 @@
+#include "cells/cell_state.hpp"
+
+#ifdef CORPUSCLE_HDF5
+
+#include <fmt/format.h>
+
+#include "core/error.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+// Columns of the table of cells.
+enum Column { type, lap_i, lap_j, lap_k, rank, first_vertex, first_triangle, columns };
+
+const char* const table_name = "cells";
+const char* const carried_name = "membranes";
+const char* const numbers_name = "cell_numbers";  // steps begun, and ranks
+
+}  // namespace
+
+Rows vertex_rows(const SharedCells& cells) {
+  Rows rows;
+  for (const CellRecord& cell : cells.own())
+    rows.add(cell.first_vertex, cells.membranes().types()[cell.type].mesh.vertices.size());
+  return rows;
+}
+
+Rows triangle_rows(const SharedCells& cells) {
+  Rows rows;
+  for (const CellRecord& cell : cells.own())
+    rows.add(cell.first_triangle, cells.membranes().types()[cell.type].mesh.triangles.size());
+  return rows;
+}
+
+Rows cell_rows(const SharedCells& cells) {
+  Rows rows;
+  for (const CellRecord& cell : cells.own()) rows.add(cell.number, 1);
+  return rows;
+}
+
+void write_cells(CheckpointWriter& file, const Comm& comm, const SharedCells& cells) {
+  std::vector<std::int64_t> table;
+  for (const CellRecord& cell : cells.own())
+    table.insert(table.end(), {cell.type, cell.laps[0], cell.laps[1], cell.laps[2], comm.rank(), cell.first_vertex,
+                               cell.first_triangle});
+  const auto width = 3 * static_cast<hsize_t>(cells.membranes().carried().size());
+  file.add(table_name, {static_cast<hsize_t>(cells.total()), columns}, cell_rows(cells), table.data());
+  file.add(carried_name, {static_cast<hsize_t>(cells.total_vertices()), width}, vertex_rows(cells), cells.carried().data());
+  const std::int64_t numbers[2] = {cells.steps(), comm.size()};
+  file.add(numbers_name, {2}, numbers);
+}
+
+void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cells) {
+  std::int64_t numbers[2];
+  file.read(numbers_name, {2}, numbers);
+  const hsize_t total = cells.total(), width = 3 * static_cast<hsize_t>(cells.membranes().carried().size());
+  const hsize_t first = total * comm.rank() / comm.size(), last = total * (comm.rank() + 1) / comm.size();
+  std::vector<CellRecord> records;
+  std::vector<int> owners;
+  std::vector<double> carried;
+  const Shape table_shape{total, columns}, carried_shape{static_cast<hsize_t>(cells.total_vertices()), width};
+  if (last > first) {
+    std::vector<std::int64_t> table((last - first) * columns);
+    file.read(table_name, table_shape, Slab{{first, 0}, {last - first, columns}}, table.data());
+    hsize_t vertices = 0;
+    for (hsize_t c = first; c < last; ++c) {
+      const std::int64_t* row = table.data() + (c - first) * columns;
+      if (row[type] < 0 || row[type] >= static_cast<std::int64_t>(cells.membranes().types().size()))
+        throw InputError(fmt::format("cells.{}: the checkpoint has a cell of a type that the case does not have", c));
+      CellRecord cell{static_cast<int>(row[type]), static_cast<int>(c), {}, row[first_vertex], row[first_triangle]};
+      for (int d = 0; d < 3; ++d) cell.laps[d] = static_cast<int>(row[lap_i + d]);
+      records.push_back(cell);
+      if (numbers[1] == comm.size()) owners.push_back(static_cast<int>(row[rank]));
+      vertices += cells.membranes().types()[cell.type].mesh.vertices.size();
+    }
+    carried.resize(vertices * width);
+    file.read(carried_name, carried_shape,
+              Slab{{static_cast<hsize_t>(records.front().first_vertex), 0}, {vertices, width}}, carried.data());
+  }
+  cells.restore(records, carried, owners, static_cast<long>(numbers[0]));
+}
+
+}  // namespace corpuscle
+
+#endif

@@ -1,0 +1,313 @@
+#include "cells/shared_cells.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "cells/cell_boxes.hpp"
+#include "coupling/periodic_frame.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+/// Every how many steps cells may come back through sides or change their rank. When they do must not depend on when copies
+/// were made, or a restart would not go on with the same bits.
+constexpr long review_every = 16;
+
+/// Of a copy, as its rank is told of it.
+struct Notice {
+  int type, number, image;
+};
+
+Vec3 to_vec3(const Triple& a) { return {a[0], a[1], a[2]}; }
+
+SpaceBox box_of(const HostMirror<Table<double>>& boxes, int cell, double margin) {
+  SpaceBox box;
+  for (int d = 0; d < 3; ++d) {
+    box.lower[d] = boxes(cell, BoxColumn::lower + d) - margin;
+    box.upper[d] = boxes(cell, BoxColumn::upper + d) + margin;
+  }
+  return box;
+}
+
+}  // namespace
+
+SharedCells::SharedCells(const std::vector<CellSettings>& cells, const Grid& grid, int layers, double contact_um,
+                         std::shared_ptr<Workspace> workspace)
+    : comm_(grid.comm()),
+      blocks_(grid, layers),
+      shift_turns_(period_turns(grid)),
+      shifts_(period_shifts(grid)),
+      frame_(periodic_frame(grid)),
+      skin_(grid.mean_spacing()),
+      contact_(contact_um) {
+  const CellTypes types = find_cell_types(cells);
+  membranes_ = std::make_unique<Membranes>(types.references, std::move(workspace));
+  start(cells, types);
+}
+
+/// Each rank takes those in its block and makes their meshes.
+void SharedCells::start(const std::vector<CellSettings>& cells, const CellTypes& types) {
+  std::vector<CellRecord> mine;
+  std::vector<double> carried;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    CellRecord cell;
+    cell.type = types.of_cell[c];
+    cell.number = static_cast<int>(c);
+    cell.first_vertex = total_vertices_;
+    cell.first_triangle = total_triangles_;
+    total_vertices_ += vertices_of(cell.type);
+    total_triangles_ += triangles_of(cell.type);
+    if (blocks_.owner(to_vec3(cells[c].center_um)) != comm_.rank()) continue;
+    mine.push_back(cell);
+    for (const Triple& x : placed_mesh(types.references[cell.type], cells[c]).vertices) {
+      carried.insert(carried.end(), x.begin(), x.end());
+      carried.insert(carried.end(), 3 * (membranes_->carried().size() - 1), 0.0);
+    }
+  }
+  total_ = static_cast<int>(cells.size());
+  restore(mine, carried, {}, 0);
+}
+
+Triple SharedCells::wrapped_by(const CellRecord& cell) const {
+  Triple shift{};
+  for (int d = 0; d < 3; ++d)
+    for (int m = 0; m < 3; ++m) shift[m] += cell.laps[d] * frame_.period[d][m];
+  return shift;
+}
+
+void SharedCells::measure(double ahead_us) {
+  const auto cells = own_.size();
+  if (!boxes_.data() || boxes_.extent(0) < cells) {
+    boxes_ = Table<double>(uninitialised("corpuscle::cells::boxes"), cells + cells / 10 + 1, BoxColumn::count);
+    before_ = Table<double>(uninitialised("corpuscle::cells::boxes_before"), boxes_.extent(0), BoxColumn::count);
+    boxes_host_ = Kokkos::create_mirror_view(boxes_);
+  }
+  if (cells > 0) measure_boxes(surfaces(), static_cast<int>(cells), ahead_us, boxes_);
+}
+
+bool SharedCells::begin_step(double ahead_us) {
+  const bool review = steps_++ % review_every == 0;
+  measure(ahead_us);
+  bool moved = false;
+  if (review) {
+    Kokkos::deep_copy(boxes_host_, boxes_);
+    moved = wrap();
+    if (moved) measure(ahead_us);
+    Kokkos::deep_copy(boxes_host_, boxes_);
+  }
+  const std::vector<int> owner = review ? owners() : std::vector<int>();
+  const bool leaving = std::any_of(owner.begin(), owner.end(), [this](int rank) { return rank != comm_.rank(); });
+  const bool left = boxes_left(static_cast<int>(own_.size()), boxes_, before_, skin_);
+  double change[2] = {leaving ? 1.0 : 0.0, moved || left ? 1.0 : 0.0};
+  comm_.max(change, 2);
+  if (change[0] + change[1] == 0) return false;
+  if (change[0] > 0) distribute(owner);
+  measure(ahead_us);
+  renew_copies();
+  return true;
+}
+
+/// Own cells whose vertices' mean lies outside the domain come back at its other end. After measure(), with boxes_host_.
+bool SharedCells::wrap() {
+  bool any = false;
+  std::vector<Vec3> by(own_.size());
+  for (std::size_t c = 0; c < own_.size(); ++c) {
+    const Vec3 from_origin = Vec3{boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1),
+                                  boxes_host_(c, BoxColumn::mean + 2)} -
+                             frame_.origin;
+    for (int d = 0; d < 3; ++d) {
+      if (!frame_.periodic[d]) continue;
+      const double turns = std::floor(dot(from_origin, frame_.dual[d]));
+      if (turns == 0 || !std::isfinite(turns)) continue;
+      any = true;
+      own_[c].laps[d] += static_cast<int>(turns);
+      by[c] += turns * frame_.period[d];
+    }
+  }
+  if (!any) return false;
+  ++moves_;
+  const Table<double> shift(uninitialised("corpuscle::cells::shift"), own_.size(), 3);
+  const auto host = Kokkos::create_mirror_view(shift);
+  for (std::size_t c = 0; c < own_.size(); ++c)
+    for (int d = 0; d < 3; ++d) host(c, d) = by[c][d];
+  Kokkos::deep_copy(shift, host);
+  shift_cells(surfaces(), surfaces().own_vertices, shift);
+  return true;
+}
+
+/// By their places. After measure(), with boxes_host_.
+std::vector<int> SharedCells::owners() const {
+  std::vector<int> owner;
+  for (std::size_t c = 0; c < own_.size(); ++c)
+    owner.push_back(blocks_.owner(
+        {boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1), boxes_host_(c, BoxColumn::mean + 2)}));
+  return owner;
+}
+
+std::vector<double> SharedCells::carried() const {
+  const auto fields = membranes_->carried();
+  const std::size_t width = 3 * fields.size();
+  std::vector<double> values(width * surfaces().own_vertices);
+  for (std::size_t f = 0; f < fields.size(); ++f) {
+    const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), fields[f]);
+    for (int i = 0; i < surfaces().own_vertices; ++i)
+      for (int d = 0; d < 3; ++d) values[width * i + 3 * f + d] = host(i, d);
+  }
+  return values;
+}
+
+void SharedCells::restore(const std::vector<CellRecord>& cells, const std::vector<double>& carried,
+                          const std::vector<int>& owners, long steps) {
+  own_ = cells;
+  set_own(carried);
+  measure(0);
+  Kokkos::deep_copy(boxes_host_, boxes_);
+  distribute(owners.empty() ? this->owners() : owners);
+  steps_ = steps;
+  measure(0);
+  renew_copies();
+}
+
+/// Holds own_, which carry this, without copies.
+void SharedCells::set_own(const std::vector<double>& carried) {
+  std::vector<HeldCell> held;
+  for (const CellRecord& cell : own_) held.push_back({cell.type, cell.number});
+  membranes_->hold(held, static_cast<int>(held.size()));
+  const auto fields = membranes_->carried();
+  const std::size_t width = 3 * fields.size();
+  for (std::size_t f = 0; f < fields.size(); ++f) {
+    const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), fields[f]);
+    for (int i = 0; i < surfaces().own_vertices; ++i)
+      for (int d = 0; d < 3; ++d) host(i, d) = carried[width * i + 3 * f + d];
+    Kokkos::deep_copy(fields[f], host);
+  }
+}
+
+/// Cells go to their owners, with all that is theirs. @param owners  [own cell]
+void SharedCells::distribute(const std::vector<int>& owners) {
+  ++moves_;
+  const std::vector<double> values = carried();
+  const std::size_t width = 3 * membranes_->carried().size();
+  Parcels parcels;
+  std::size_t at = 0;
+  for (std::size_t c = 0; c < own_.size(); ++c) {
+    const std::size_t count = width * vertices_of(own_[c].type);
+    put(parcels[owners[c]], &own_[c], 1);
+    put(parcels[owners[c]], values.data() + at, count);
+    at += count;
+  }
+  const Parcels arrived = exchange_parcels(comm_, parcels);
+  struct Arrival {
+    CellRecord cell;
+    const std::vector<char>* bytes;
+    std::size_t at;
+  };
+  std::vector<Arrival> arrivals;
+  for (const auto& [rank, bytes] : arrived)
+    for (std::size_t n = 0; n < bytes.size();) {
+      Arrival one{{}, &bytes, 0};
+      one.at = take(bytes, n, &one.cell, 1);
+      n = one.at + width * vertices_of(one.cell.type) * sizeof(double);
+      arrivals.push_back(one);
+    }
+  std::sort(arrivals.begin(), arrivals.end(),
+            [](const Arrival& a, const Arrival& b) { return a.cell.number < b.cell.number; });
+  own_.clear();
+  std::vector<double> carried;
+  for (const Arrival& one : arrivals) {
+    own_.push_back(one.cell);
+    const std::size_t begin = carried.size();
+    carried.resize(begin + width * vertices_of(one.cell.type));
+    take(*one.bytes, one.at, carried.data() + begin, carried.size() - begin);
+  }
+  set_own(carried);
+}
+
+/// Of every rank, the box around its own cells; none without contact. After measure(), with boxes_host_.
+std::vector<SpaceBox> SharedCells::find_reach() const {
+  std::vector<SpaceBox> reach;
+  if (contact_ == 0) return reach;
+  std::vector<double> all(6 * static_cast<std::size_t>(blocks_.ranks()), 0.0);
+  double* mine = all.data() + 6 * static_cast<std::size_t>(comm_.rank());
+  for (int d = 0; d < 3; ++d) mine[d] = 1e300, mine[3 + d] = -1e300;
+  for (std::size_t c = 0; c < own_.size(); ++c) {
+    const SpaceBox box = box_of(boxes_host_, static_cast<int>(c), skin_);
+    for (int d = 0; d < 3; ++d) {
+      mine[d] = std::min(mine[d], box.lower[d]);
+      mine[3 + d] = std::max(mine[3 + d], box.upper[d]);
+    }
+  }
+  comm_.sum(all.data(), static_cast<int>(all.size()));
+  for (std::size_t n = 0; n < all.size(); n += 6) reach.push_back({{all[n], all[n + 1], all[n + 2]}, {all[n + 3], all[n + 4], all[n + 5]}});
+  return reach;
+}
+
+/// After measure().
+void SharedCells::renew_copies() {
+  ++renewals_;
+  Kokkos::deep_copy(boxes_host_, boxes_);
+  Kokkos::deep_copy(before_, boxes_);
+  const std::vector<SpaceBox> reach = find_reach();
+  std::map<int, std::vector<CopyMessages::Copy>> wanted;
+  Parcels notices;
+  for (std::size_t c = 0; c < own_.size(); ++c) {
+    const SpaceBox box = box_of(boxes_host_, static_cast<int>(c), skin_ + contact_);
+    for (std::size_t image = 0; image < shifts_.size(); ++image) {
+      const SpaceBox seen{box.lower + shifts_[image], box.upper + shifts_[image]};
+      for (int rank = 0; rank < blocks_.ranks(); ++rank) {
+        if (image == 0 && rank == comm_.rank()) continue;
+        if (!blocks_.reaches(seen, rank) && !(contact_ > 0 && overlap(seen, reach[rank]))) continue;
+        const Notice notice{own_[c].type, own_[c].number, static_cast<int>(image)};
+        put(notices[rank], &notice, 1);
+        wanted[rank].push_back(
+            {rank, static_cast<int>(c), vertices_of(own_[c].type), static_cast<int>(image), shifts_[image]});
+      }
+    }
+  }
+  std::vector<CopyMessages::Copy> sent, received;
+  for (const auto& [rank, copies] : wanted) sent.insert(sent.end(), copies.begin(), copies.end());
+  std::vector<Notice> told;
+  for (const auto& [rank, bytes] : exchange_parcels(comm_, notices))
+    for (std::size_t n = 0; n < bytes.size();) {
+      Notice notice;
+      n = take(bytes, n, &notice, 1);
+      told.push_back(notice);
+      received.push_back({rank, 0, vertices_of(notice.type), notice.image, {}});
+    }
+  // Copies stand in an order that does not depend on whose they are.
+  std::vector<int> order(told.size());
+  for (std::size_t n = 0; n < order.size(); ++n) order[n] = static_cast<int>(n);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return std::make_pair(told[a].number, told[a].image) < std::make_pair(told[b].number, told[b].image);
+  });
+  std::vector<HeldCell> held;
+  for (const CellRecord& cell : own_) held.push_back({cell.type, cell.number});
+  for (int n : order) {
+    received[n].cell = static_cast<int>(held.size());
+    held.push_back({told[n].type, told[n].number});
+  }
+  membranes_->hold(held, static_cast<int>(own_.size()));
+  messages_.set(comm_, sent, received);
+  note_turns(received);
+}
+
+void SharedCells::note_turns(const std::vector<CopyMessages::Copy>& received) {
+  const auto bodies = static_cast<std::size_t>(surfaces().bodies);
+  if (!turns_.data() || turns_.extent(0) < bodies)
+    turns_ = Table<int>(uninitialised("corpuscle::cells::turns"), bodies + bodies / 10 + 1, 3);
+  const auto turns = Kokkos::create_mirror_view(turns_);
+  Kokkos::deep_copy(turns, 0);
+  for (const CopyMessages::Copy& copy : received)
+    for (int d = 0; d < 3; ++d) turns(copy.cell, d) = shift_turns_[copy.image][d];
+  Kokkos::deep_copy(turns_, turns);
+}
+
+void SharedCells::to_copies(const Components<double>& field, bool positions) {
+  messages_.to_copies(surfaces(), field, positions);
+}
+
+void SharedCells::add_copies(const Components<double>& field) { messages_.add_copies(surfaces(), field); }
+
+}  // namespace corpuscle

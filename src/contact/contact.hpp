@@ -1,0 +1,111 @@
+// Contact between surfaces: lists of who may touch whom, forces that keep them apart, and crossings, which are found
+// and undone.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "contact/contact_law.hpp"
+#include "contact/contact_report.hpp"
+#include "contact/contact_views.hpp"
+#include "contact/keep_apart.hpp"
+#include "contact/triangle_bins.hpp"
+#include "input/case.hpp"
+#include "parallel/comm.hpp"
+
+namespace corpuscle {
+
+/// The other ranks, where cells are shared out. Every rank makes the same calls.
+struct ContactPeers {
+  Comm comm;
+  std::function<void()> update_copies;  // positions of this rank's cells to all their copies
+};
+
+struct GapGoal;
+struct Shortfall;
+
+class Contact {
+ public:
+  /// @param surfaces  in the place where the bodies start; their areas are taken as those at rest
+  /// @param images    shifts under which bodies are seen besides their own place; the identity first
+  /// @param viscosity  mPa s, of the fluid between them
+  /// @param blend_um  up to this gap to other bodies gaps() are wanted; 0 for none
+  Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
+          double blend_um, const ContactPeers* peers = nullptr);
+
+  /// The surfaces are others from now on: those of `set`, of the types of cells in `types`. look() must follow.
+  /// @param type  [body] of set
+  void take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type);
+
+  /// What is near what at the surfaces' present positions. Crossings are counted, told and undone.
+  /// @param dt  of the next step, us
+  /// @throws ComputationError  if a crossing cannot be undone
+  void look(double time_us, double dt);
+  /// The same before the first step, where crossings are an error of the input.
+  /// @throws InputError
+  void look_at_start(double dt);
+  /// After a move: no gap has lost more than half of what it was when look() saw it. What went through is counted and
+  /// told.
+  void limit_approach(double time_us);
+  /// The same for positions that are only looked ahead to.
+  void limit_ahead();
+
+  /// Adds the forces between surfaces at the present positions, which may be ahead of those that look() saw, to `force`
+  /// [vertex, 3].
+  void add_forces(double dt, bool ahead, const Components<double>& force);
+  /// The law for steps of that length: the stiffest film that they can follow is that of Stokes flow between two
+  /// membranes, whose gap opens at most at the rate 0.15 x gap x stiffness / viscosity.
+  ContactLaw law(double dt) const;
+  /// Fastest rate at which aggregated membranes relax, 1/us; the repulsion adapts to the step.
+  double fastest_relaxation_per_us() const;
+
+  /// [vertex] um to the nearest other body, of look() or add_forces(), whichever was last; large where nothing is near.
+  const Array<double>& gaps() const { return gap_; }
+  /// Energy of the contacts that look() saw, fJ, of all ranks.
+  double energy(double dt) const;
+  const Array<double>& rest_area() const { return rest_.area; }
+  const ContactReport& report() const { return report_; }
+  void resume(const ContactReport& report) { report_ = report; }
+
+  const ContactLists& lists() const { return lists_; }
+  const ContactViews& contacts() const { return now_; }
+
+ private:
+  void make_arrays();
+  void push(const ContactViews& contacts, const Components<double>& sum);
+  CrossingCount crossings();
+  double smallest_gap() const;
+  Shortfall shortfall(const GapGoal& goal);
+  std::string told_text(int first) const;
+  void make_lists(double dt);
+  void make_bins(double width);
+  ContactViews make_contacts(const ContactViews* shares) const;
+  void find(const ContactViews& contacts);
+  Shortfall correct(double share, double least);
+  void mend_crossings(double time_us);
+  void count_crossings(int vertices, int first, double time_us);
+  std::string crossing_text(int contact) const;
+
+  ContactSettings settings_;
+  SurfaceSet surface_;
+  Images images_;
+  double viscosity_;
+  ContactReach reach_;  // without the skin
+  ContactRest rest_;
+  TriangleBins bins_;
+  int bin_room_ = 0;
+  ContactLists lists_;
+  int item_room_ = 0, group_room_ = 0;
+  ContactViews now_, ahead_;   // at the positions of look(), and at those ahead if there are any
+  Components<double> listed_;  // [vertex, 3] um, where the lists were made
+  double skin_ = -1;           // um; negative before there are lists
+  Array<int> side_;            // [vertex]
+  Array<double> gap_;          // [vertex]
+  int movable_ = 0;            // vertices of cells
+  int own_ = 0;                // of those of this rank
+  std::optional<ContactPeers> peers_;
+  ContactReport report_;
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,64 @@
+// What acts on membranes besides their own forces: contact, walls, and pushes from outside.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "contact/contact.hpp"
+#include "contact/wall_contact.hpp"
+#include "cells/shared_cells.hpp"
+#include "transfer/transfer.hpp"
+
+namespace corpuscle {
+
+class CellLoads {
+ public:
+  /// @param viscosity  mPa s, of the fluid between cells
+  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity);
+  /// Whether a case has any.
+  static bool wanted(const Case& scene);
+
+  /// The cells at hand are others from now on. look() must follow, with valid copies.
+  void take_up();
+  /// @throws InputError  if cells cross where they start
+  void look_at_start(double dt_us);
+  /// After a step's move: who is near whom for the next one of that length. Crossings are told and undone.
+  /// @throws ComputationError  if they cannot be
+  void look(double time_us, double dt_us);
+  /// After a move: gaps must not close.
+  void limit_approach(double time_us);
+  /// The same for positions that are only looked ahead to.
+  void limit_ahead();
+
+  /// The sum of all forces on the fluid, [vertex, 3] nN. After Transfer::place().
+  /// @param ahead  the membranes are ahead of where look() saw them
+  void gather(double dt_us, bool ahead);
+  const Components<double>& force() const { return force_; }
+  /// [vertex] um to the nearest other cell; without values where there is no contact.
+  Array<double> gaps() const { return contact_ ? contact_->gaps() : Array<double>(); }
+
+  /// Of the pushes, nW, on membranes of the present velocity.
+  double power_of_pushes() const;
+  /// fJ, of the contacts between cells as look() saw them and with walls at the last gather().
+  double contact_energy(double dt_us) const;
+  double fastest_relaxation_per_us() const { return contact_ ? contact_->fastest_relaxation_per_us() : 0; }
+  std::optional<ContactReport> report() const;
+  void resume(const ContactReport& report);
+
+ private:
+  void add_walls(double dt_us);
+
+  SharedCells& cells_;
+  const Membranes& membranes_;
+  const Comm comm_;
+  const Transfer& transfer_;
+  std::unique_ptr<Contact> contact_;  // only with [contact]
+  WallSides walls_;
+  Components<double> force_;  // [vertex, 3] nN
+  Components<double> wall_;   // [vertex, 4] nN, fJ; only with walls
+  double wall_energy_ = 0;      // fJ
+  std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
+  Table<double> share_;         // [own cell, 3] nN; only if any is pushed
+};
+
+}  // namespace corpuscle

@@ -1,0 +1,26 @@
+// [contact].
+#include "core/units.hpp"
+#include "input/sections.hpp"
+
+namespace corpuscle {
+
+ContactSettings read_contact(Section& s) {
+  constexpr double least_um = 0.01, most_contact_um = 2, most_fJ_per_um2 = 10;
+  ContactSettings c;
+  c.range_um = s.number("range_um", between(least_um, most_contact_um), c.range_um);
+  c.pressure = s.number("pressure_Pa", positive(1e6), c.pressure / units::Pa) * units::Pa;
+  c.aggregation_energy = s.number("aggregation_energy_fJ_per_um2", between(0, most_fJ_per_um2), c.aggregation_energy);
+  const std::string reach = "aggregation_range_um";
+  if (c.aggregation_energy > 0) {
+    c.aggregation_range_um = s.number(reach, between(least_um, 2 * most_contact_um), 2 * c.range_um);
+    if (c.aggregation_range_um < 1.2 * c.range_um)
+      s.fail(reach, "must be at least 1.2 times range_um, where the repulsion ends and the attraction is strongest");
+  } else {
+    s.describe(reach, "a number, at least 1.2 times range_um", "twice range_um");
+    s.unused(reach, "only with aggregation_energy_fJ_per_um2 above 0");
+  }
+  s.finish();
+  return c;
+}
+
+}  // namespace corpuscle

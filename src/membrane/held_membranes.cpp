@@ -1,0 +1,146 @@
+// Membranes of the cells that a rank holds at present.
+#include <algorithm>
+
+#include "cells/topology.hpp"
+#include "membrane/membrane_setup.hpp"
+#include "membrane/membrane_viscosity.hpp"
+#include "membrane/membranes.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+/// Some to spare, so that arrays are seldom too small.
+std::size_t roomy(std::size_t count) { return count + count / 16 + 1; }
+
+template <class View>
+bool has_room(const View& view, std::size_t rows) {
+  return view.data() && view.extent(0) >= rows;
+}
+
+/// @param columns  of the view, if it has two dimensions
+template <class View, class... Columns>
+void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
+  if (has_room(view, rows)) return;
+  view = View();  // free before taking more
+  view = View(uninitialised(std::string("corpuscle::membrane::") + name), roomy(rows), columns...);
+}
+
+/// With its content.
+void extend(Components<double>& view, const char* name, std::size_t rows) {
+  if (has_room(view, rows)) return;
+  const Components<double> before = view;
+  view = Components<double>(std::string("corpuscle::membrane::") + name, roomy(rows), 3);
+  if (!before.data()) return;
+  const auto all = std::make_pair(std::size_t(0), before.extent(0));
+  Kokkos::deep_copy(Kokkos::subview(view, all, Kokkos::ALL), before);
+}
+
+void fill(const Array<int>& view, const std::vector<int>& values) {
+  const auto part = Kokkos::subview(view, std::make_pair(std::size_t(0), values.size()));
+  const auto host = Kokkos::create_mirror_view(part);
+  std::copy(values.begin(), values.end(), host.data());
+  Kokkos::deep_copy(part, host);
+}
+
+}  // namespace
+
+void MembraneViscosity::hold(const MembraneViews& m) {
+  extend(given_, "given_vertex", m.vertices);
+  extend(views_.right_side, "right_side_vertex", m.vertices);
+  grow(views_.iterations, "iterations_cell", m.cells);
+}
+
+Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)
+    : types_(types), workspace_(std::move(workspace)) {
+  std::vector<TriangleMesh> meshes;
+  for (const CellReference& type : types_) meshes.push_back(type.mesh);
+  templates_ = make_surface_set(meshes);
+  views_ = make_membrane_views(make_surface_set({}), types_, {});
+  make_viscosity();
+  status_host_ = HostCopy(views_.status);
+  hold({}, 0);
+}
+
+/// What messages, the history and the sub-steps ask of each cell.
+void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
+  law_.clear(), vertex_mass_.clear(), vertex_area_.clear(), rest_area_.clear(), rest_volume_.clear(), number_.clear();
+  holds_area_.clear();
+  for (int c = 0; c < own; ++c) {
+    const CellReference& type = types_[cells[c].type];
+    law_.push_back(type.in_plane);
+    vertex_mass_.push_back(type.law.vertex_mass);
+    vertex_area_.push_back(type.smallest_vertex_area);
+    rest_area_.push_back(type.law.rest_area);
+    rest_volume_.push_back(type.law.rest_volume);
+    number_.push_back(cells[c].number);
+    holds_area_.push_back(type.law.area > 0);
+  }
+}
+
+void Membranes::make_room(const SurfaceSet& needed) {
+  SurfaceSet& set = views_.surface;
+  extend(set.x, "x_vertex", needed.vertices);
+  extend(set.v, "v_vertex", needed.vertices);
+  grow(set.normal, "normal_vertex", needed.vertices, 3);
+  grow(set.area, "area_vertex", needed.vertices);
+  grow(set.vertex_body, "vertex_body", needed.vertices);
+  grow(set.ring_start, "ring_start", needed.vertices + 1);
+  grow(set.triangle, "triangle", needed.triangles, 3);
+  grow(set.neighbour, "neighbour", needed.triangles, 3);
+  grow(set.triangle_body, "triangle_body", needed.triangles);
+  grow(set.ring_triangle, "ring_triangle", 3 * std::size_t(needed.triangles));
+  grow(set.ring_corner, "ring_corner", 3 * std::size_t(needed.triangles));
+  grow(set.first_vertex, "first_vertex", needed.bodies + 1);
+  grow(set.first_triangle, "first_triangle", needed.bodies + 1);
+  grow(set.number, "number_body", needed.bodies);
+  grow(views_.type, "type_body", needed.bodies);
+  grow(views_.triangle_geometry, "triangle_geometry", views_.triangles, 4);
+  grow(views_.totals, "totals_section", std::size_t(views_.cells) * sections, 2);
+  grow(views_.force, "force_vertex", needed.vertices, 3);
+  grow(motion_.sums, "motion_sums_section", std::size_t(views_.cells) * sections, 2);
+  grow(start_x_, "start_x_vertex", views_.vertices, 3);
+  grow(start_v_, "start_v_vertex", views_.vertices, 3);
+}
+
+/// What is only of use within a call lies where others have such things in between.
+void Membranes::take_workspace() {
+  if (!workspace_) return;
+  const std::size_t triangles = views_.triangles, vertices = views_.vertices;
+  double* memory = workspace_->reserve(9 * triangles + 3 * vertices + (viscosity_ ? viscosity_->scratch(views_) : 0));
+  if (viscosity_) viscosity_->use_scratch(views_, memory + 9 * triangles + 3 * vertices);
+  views_.corner_force = Table<double>(memory, triangles, 9);
+  motion_.direction = Components<double>(memory + 9 * triangles, vertices, 3);
+}
+
+void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
+  SurfaceSet& set = views_.surface;
+  std::vector<int> type, number, first_vertex{0}, first_triangle{0}, type_of_own;
+  for (const HeldCell& cell : cells) {
+    type.push_back(cell.type);
+    number.push_back(cell.number);
+    first_vertex.push_back(first_vertex.back() + int(types_[cell.type].mesh.vertices.size()));
+    first_triangle.push_back(first_triangle.back() + int(types_[cell.type].mesh.triangles.size()));
+  }
+  type_of_own.assign(type.begin(), type.begin() + own);
+  set.bodies = set.cells = int(cells.size());
+  set.own_cells = own;
+  set.vertices = first_vertex.back();
+  set.triangles = first_triangle.back();
+  set.own_vertices = first_vertex[own];
+  views_.cells = own;
+  views_.vertices = first_vertex[own];
+  views_.triangles = first_triangle[own];
+  make_room(set);
+  fill(set.first_vertex, first_vertex);
+  fill(set.first_triangle, first_triangle);
+  fill(set.number, number);
+  fill(views_.type, type);
+  if (set.bodies > 0) fill_topology(templates_, views_.type, set);
+  if (viscosity_) viscosity_->hold(views_);
+  describe_cells(cells, own);
+  stiffness_.clear();
+  elasticity_ = make_elasticity(types_, type_of_own);
+}
+
+}  // namespace corpuscle

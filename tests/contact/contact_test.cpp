@@ -1,0 +1,345 @@
+#include "contact/contact.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "core/error.hpp"
+#include "immersed/triangle.hpp"
+#include "membrane/reference.hpp"
+#include "surfaces.hpp"
+
+using namespace corpuscle;
+using namespace corpuscle::testing;
+
+namespace {
+
+constexpr double mu = 1.1, dt = 1e-3;  // mPa s; us: so short that the law is nowhere flattened
+
+ContactSettings settings(double range, double aggregation = 0) {
+  ContactSettings s;
+  s.range_um = range;
+  s.aggregation_energy = aggregation;
+  s.aggregation_range_um = 2 * range;
+  return s;
+}
+
+/// Two spheres of radius 2 whose surfaces are `gap` apart along z, turned against each other.
+SurfaceSet two_spheres(double gap, double edge) {
+  TriangleMesh second = transform(sphere_mesh(2, {0, 0, 0}, edge), {0.3, 0.5, 1}, 20, {0, 0, 4 + gap});
+  return cells_of({sphere_mesh(2, {0, 0, 0}, edge), second});
+}
+
+struct Totals {
+  Vec3 force, torque;
+  double size = 0;  // sum of the forces' norms
+};
+Totals totals(const SurfaceSet& set, const Components<double>& force, int body = -1) {
+  const auto x = on_host(set.x), f = on_host(force);
+  const auto of = on_host(set.vertex_body);
+  Totals t;
+  for (int v = 0; v < set.vertices; ++v) {
+    if (body >= 0 && of(v) != body) continue;
+    t.force += load(f, v);
+    t.torque += cross(load(x, v), load(f, v));
+    t.size += norm(load(f, v));
+  }
+  return t;
+}
+
+/// A red cell, and one pressed flat to a share of its height: its middle then nearly touches itself through the inside.
+SurfaceSet red_cell() {
+  CellSettings cell;
+  cell.vertices = 500;
+  return cells_of({placed_mesh(make_reference(cell), cell)});
+}
+
+}  // namespace
+
+TEST_CASE("the law is the derivative of its energy, without bound at no gap and nothing beyond its reach",
+          "[contact]") {
+  ContactLaw law;
+  law.range = 0.25, law.pressure = 0.02, law.knee = GENERATE(0.0, 0.07);
+  law.depth = 1e-3, law.reach = 0.6, law.steepness = 4 / 0.35;
+  for (double d : {0.01, 0.0699, 0.0701, 0.12, 0.2499, 0.26, 0.42, 0.43, 0.55, 0.5999}) {
+    constexpr double e = 1e-6;
+    const double slope = (law.total_energy(d + e, true) - law.total_energy(d - e, true)) / (2 * e);
+    CHECK(law.total_pressure(d, true) == Approx(-slope).epsilon(1e-5).margin(1e-8));
+  }
+  CHECK(law.total_pressure(0.125, false) == Approx(0.02));
+  CHECK(law.total_pressure(0.25, false) == 0);
+  CHECK(law.total_pressure(0.6, true) == 0);
+  CHECK(law.total_pressure(0.3, true) < 0);
+  CHECK(law.total_energy(0.25, true) == Approx(-1e-3));
+  if (law.knee == 0) CHECK(law.total_pressure(1e-4, false) > 1e4 * law.pressure);
+  // Flattened: continuous, with its slope, and as large for what has crossed.
+  if (law.knee > 0) CHECK(law.total_pressure(-0.01, false) > law.total_pressure(0.0, false));
+}
+
+TEST_CASE("gaps and forces of two spheres are those of spheres", "[contact]") {
+  const double gap = 0.1, range = 0.3, radius = 2;
+  double error[2];
+  for (int fine = 0; fine < 2; ++fine) {
+    const double edge = fine ? 0.15 : 0.3, sagitta = edge * edge / (4 * radius);  // edges are up to 1.2 times as long
+    const SurfaceSet set = two_spheres(gap, edge);
+    Contact contact(settings(range), set, Images{}, mu, 0.8);
+    contact.look_at_start(dt);
+    const auto gaps = on_host(contact.gaps());
+    const auto x = on_host(set.x);
+    const auto body = on_host(set.vertex_body);
+    int seen = 0;
+    for (int v = 0; v < set.vertices; ++v) {
+      const double exact = norm(load(x, v) - Vec3{0, 0, body(v) == 0 ? 4 + gap : 0.0}) - radius;
+      if (gaps(v) > 1) {
+        CHECK(exact > 0.8 - sagitta);
+        continue;
+      }
+      ++seen;  // the triangles lie within the sphere
+      CHECK(gaps(v) >= exact - 1e-12);
+      CHECK(gaps(v) <= exact + sagitta);
+    }
+    CHECK(seen > 20);
+    // Every vertex of one sphere feels the whole other one, half of the force each way: the integral over one sphere.
+    const ContactLaw law = contact.law(dt);
+    double exact = 0;
+    constexpr int steps = 20000;
+    for (int n = 0; n < steps; ++n) {
+      const double angle = (n + 0.5) * std::acos(-1.0) / steps, z = radius * std::cos(angle),
+                   r = radius * std::sin(angle);
+      const double distance = std::hypot(r, 4 + gap - z);
+      exact += law.repulsion(distance - radius) * (4 + gap - z) / distance * 2 * std::acos(-1.0) * r * radius *
+               std::acos(-1.0) / steps;
+    }
+    const Totals lower = totals(set, forces_of(contact, set, dt, false), 0);
+    error[fine] = std::abs(-lower.force.z / exact - 1);
+    INFO("force " << lower.force.z << " nN, exact " << -exact);
+    CHECK(lower.force.z < 0);
+    CHECK(std::hypot(lower.force.x, lower.force.y) < 0.05 * exact);  // the meshes are not symmetric
+  }
+  // The facets' sagitta, 0.0075 and 0.0019 um, over gaps of 0.1 um and more with a pressure that goes with the gap's
+  // square.
+  CHECK(error[0] < 0.2);
+  CHECK(error[1] < 0.05);
+}
+
+TEST_CASE("forces add up to no force and no torque, and are the gradient of the energy", "[contact]") {
+  const double range = 0.3;
+  SurfaceSet set = two_spheres(0.05, 0.25);
+  Noise noise;
+  move_vertices(set, [&](int, const Vec3& x) { return x + 0.02 * noise.vector(); });
+  Contact contact(settings(range, GENERATE(0.0, 2e-3)), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  const auto force = forces_of(contact, set, dt, false);
+  const Totals all = totals(set, force);
+  CHECK(all.size > 0.01);
+  CHECK(norm(all.force) < 1e-13 * all.size);
+  CHECK(norm(all.torque) < 1e-12 * all.size);
+  const auto f = on_host(force);
+  std::vector<Vec3> way;
+  double expected = 0;
+  for (int v = 0; v < set.vertices; ++v) way.push_back(noise.vector()), expected -= dot(load(f, v), way[v]);
+  constexpr double e = 1e-7;  // um: the distance's second derivatives jump where the nearest feature changes
+  double energy[2];
+  for (int end = 0; end < 2; ++end) {
+    const auto x = on_host(set.x);
+    for (int v = 0; v < set.vertices; ++v) store(x, v, load(x, v) + (end == 0 ? -e : 2 * e) * way[v]);
+    Kokkos::deep_copy(set.x, x);
+    contact.look(0, dt);
+    energy[end] = contact.energy(dt);
+  }
+  CHECK((energy[1] - energy[0]) / (2 * e) == Approx(expected).epsilon(1e-5));
+  CHECK(contact.report().crossings == 0);
+}
+
+TEST_CASE("lists find what looking at every triangle finds", "[contact]") {
+  const double range = 0.3, blend = 0.7;
+  // Three spheres, one of which is near to its own image and to another beyond a periodic side.
+  SurfaceSet set =
+      cells_of({sphere_mesh(2, {0, 0, 0}, 0.4), transform(sphere_mesh(1.6, {0, 0, 0}, 0.3), {1, 2, 3}, 0, {0, 0, 3.7}),
+                transform(sphere_mesh(1.5, {0, 0, 0}, 0.5), {2, 1, 3}, 0, {3.65, 0.2, 0.3})});
+  Images images;
+  images.count = 3;
+  images.shift[1] = {7.6, 0.1, 0}, images.shift[2] = -images.shift[1];
+  Contact contact(settings(range), set, images, mu, blend);
+  contact.look_at_start(dt);
+  Noise noise;
+  for (int round = 0; round < 4; ++round) {
+    const auto x = on_host(set.x);
+    const auto triangle = on_host(set.triangle);
+    const auto of_vertex = on_host(set.vertex_body), of_triangle = on_host(set.triangle_body);
+    const auto first = on_host(contact.lists().first_group);
+    const auto item = on_host(contact.contacts().item);
+    const auto gap = on_host(contact.contacts().gap);
+    int found = 0, beyond = 0;
+    for (int v = 0; v < set.vertices; ++v) {
+      std::vector<int> own;
+      for (int g = first(v); g < first(v + 1); ++g)
+        if (item(g) >= 0) own.push_back(g);
+      std::size_t at = 0;
+      for (int m = 0; m < images.count; ++m)
+        for (int body = 0; body < set.bodies; ++body) {
+          if (m == 0 && body == of_vertex(v)) continue;
+          double best = 1e300;
+          int nearest = -1;
+          for (int t = 0; t < set.triangles; ++t) {
+            if (of_triangle(t) != body) continue;
+            const Vec3 p = load(x, v) + images.shift[m], a = load(x, triangle(t, 0)), b = load(x, triangle(t, 1)),
+                       c = load(x, triangle(t, 2));
+            const TrianglePoint k = closest_on_triangle(p, a, b, c);
+            const Vec3 r = p - (k.weight[0] * a + k.weight[1] * b + k.weight[2] * c);
+            if (dot(r, r) < best) best = dot(r, r), nearest = m * set.triangles + t;
+          }
+          if (!(best < blend * blend)) continue;
+          REQUIRE(at < own.size());
+          CHECK(item(own[at]) == nearest);
+          CHECK(std::abs(gap(own[at])) == Approx(std::sqrt(best)).margin(1e-12));  // fused operations
+          ++at, ++found, beyond += m > 0 ? 1 : 0;
+        }
+      CHECK(at == own.size());
+    }
+    CHECK(found > 100);
+    CHECK(beyond > 10);
+    // On within the skin, and the last time far beyond it.
+    const double step = round == 2 ? 0.2 : 0.02;
+    move_vertices(set, [&](int body, const Vec3& p) {
+      return p + step * Vec3{body == 0 ? 0.3 : -0.1, 0.2 * body, -0.05 * body};
+    });
+    contact.look(0, dt);
+  }
+  CHECK(contact.report().crossings == 0);
+}
+
+TEST_CASE("lists are kept while nothing has come through the skin", "[contact]") {
+  SurfaceSet set = two_spheres(0.4, 0.4);
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  for (int n = 0; n < 20; ++n) {  // all together, which changes no gap
+    move_vertices(set, [](int, const Vec3& p) { return p + Vec3{0.3, 0, 0}; });
+    contact.look(0, dt);
+  }
+  CHECK(contact.report().lists == 1);
+  for (int n = 0; n < 20; ++n) {
+    move_vertices(set, [](int body, const Vec3& p) { return p + Vec3{body == 0 ? 0.01 : -0.01, 0, 0}; });
+    contact.look(0, dt);
+  }
+  CHECK(contact.report().lists > 1);
+  CHECK(contact.report().lists < 10);
+}
+
+TEST_CASE("surfaces that cross are seen, counted and parted", "[contact]") {
+  SurfaceSet set = two_spheres(0.1, 0.3);
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  const double overlap = GENERATE(0.03, 0.1);
+  move_vertices(set, [&](int body, const Vec3& p) { return p - Vec3{0, 0, body == 1 ? 0.1 + overlap : 0.0}; });
+  const auto x = on_host(set.x);
+  const auto body = on_host(set.vertex_body);
+  int inside = 0;
+  for (int v = 0; v < set.vertices; ++v)
+    if (norm(load(x, v) - Vec3{0, 0, body(v) == 0 ? 4 - overlap : 0.0}) < 2 - 0.0075) ++inside;
+  contact.look(10, dt);
+  INFO(inside << " vertices well inside, " << contact.report().crossings << " counted");
+  CHECK(contact.report().crossings > 0);
+  CHECK(contact.report().crossings >= inside);
+  CHECK(contact.report().smallest_gap > 0);
+  const long counted = contact.report().crossings;
+  contact.look(11, dt);
+  CHECK(contact.report().crossings == counted);
+  move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 1.0 : 0.0}; });
+  CHECK_THROWS_WITH(contact.look(12, dt), Catch::Contains("surfaces cross: cells.") && Catch::Contains("um at 12 us") &&
+                                              Catch::Contains("time.step_us"));
+  CHECK_THROWS_AS(
+      [&] {
+        move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 0.3 : 0.0}; });
+        Contact(settings(0.25), set, Images{}, mu, 0).look_at_start(dt);
+      }(),
+      InputError);
+}
+
+TEST_CASE("no move takes more than half of a gap away", "[contact]") {
+  SurfaceSet set = two_spheres(0.1, 0.3);
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  Noise noise;
+  const auto gaps = on_host(contact.gaps());
+  const std::vector<double> before(gaps.data(), gaps.data() + gaps.span());
+  const double way = GENERATE(0.01, 0.09, 0.2);
+  move_vertices(set, [&](int body, const Vec3& p) {
+    return p - Vec3{0, 0, body == 1 ? way : 0.0} + 0.01 * noise.vector();
+  });
+  const auto moved = on_host(set.x);
+  contact.limit_approach(0);
+  CHECK((contact.report().limited > 0) == (way > 0.02));
+  CHECK((contact.report().crossings > 0) == (way > 0.1));
+  const long counted = contact.report().crossings;
+  const auto kept = on_host(set.x);
+  double most = 0;
+  Vec3 sum;
+  for (int v = 0; v < set.vertices; ++v)
+    most = std::max(most, norm(load(kept, v) - load(moved, v))), sum += load(kept, v) - load(moved, v);
+  if (way < 0.02) CHECK(most == 0);
+  CHECK(norm(sum) < 1e-12);  // equal and opposite
+  contact.look(0, dt);
+  CHECK(contact.report().crossings == counted);
+  const auto after = on_host(contact.gaps());
+  for (int v = 0; v < set.vertices; ++v)
+    if (before[v] < 0.2)
+      CHECK(after(v) > 0.35 * before[v]);  // the nearest point moves on, and the correction has passes
+}
+
+TEST_CASE("a membrane that buckles at the scale of its mesh does not touch itself", "[contact]") {
+  SurfaceSet set = red_cell();
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  std::vector<Vec3> start;
+  move_vertices(set, [&](int, const Vec3& p) { return start.push_back(p), p; });
+  const Vec3 centre = start[7];
+  // Drawn together around one vertex, to and fro: triangles of the second ring, 0.4 um away at rest, come as near as
+  // 0.2 um.
+  for (double height : {0.06, -0.06, 0.06}) {
+    std::size_t v = 0;
+    move_vertices(set, [&](int, const Vec3&) {
+      const Vec3 p = start[v];
+      const double sign = ++v % 2 == 0 ? 1 : -1, away = norm(p - centre);
+      return away < 0.9 && away > 0 ? centre + 0.4 * (p - centre) + sign * height * Vec3{0, 0, 1} : p;
+    });
+    contact.look(0, dt);
+    CHECK(contact.report().crossings == 0);
+    CHECK(contact.energy(dt) == 0);
+  }
+}
+
+TEST_CASE("a cell does not touch itself as it is, is pushed apart where it is pinched, and does not go through itself",
+          "[contact]") {
+  SurfaceSet set = red_cell();
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  CHECK(contact.energy(dt) == 0);
+  move_vertices(set, [](int, const Vec3& p) {  // in the middle, as thin as a tenth
+    const double r = std::hypot(p.x, p.y), t = std::min(1.0, r / 2.5);
+    return Vec3{p.x, p.y, p.z * (0.1 + 0.9 * t * t)};
+  });
+  contact.look(0, dt);
+  CHECK(contact.report().crossings == 0);
+  CHECK(contact.energy(dt) > 0);
+  const auto force = forces_of(contact, set, dt, false);
+  const Totals all = totals(set, force);
+  CHECK(norm(all.force) < 1e-13 * all.size);
+  CHECK(norm(all.torque) < 1e-12 * all.size);
+  const auto f = on_host(force), x = on_host(set.x);
+  int pushed = 0;
+  for (int v = 0; v < set.vertices; ++v)
+    if (norm(load(f, v)) > 1e-6) {
+      ++pushed;
+      CHECK(f(v, 2) * x(v, 2) > 0);
+    }
+  CHECK(pushed > 20);
+  // Through each other by as much: their places exchanged.
+  move_vertices(set, [](int, const Vec3& p) { return std::hypot(p.x, p.y) < 0.6 ? Vec3{p.x, p.y, -p.z} : p; });
+  contact.look(1, dt);
+  CHECK(contact.report().crossings > 0);
+  const long counted = contact.report().crossings;
+  contact.look(2, dt);
+  CHECK(contact.report().crossings == counted);
+  const auto after = on_host(set.x);
+  for (int v = 0; v < set.vertices; ++v)
+    if (std::hypot(x(v, 0), x(v, 1)) < 0.3) CHECK(after(v, 2) * x(v, 2) > 0);
+}

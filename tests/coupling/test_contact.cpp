@@ -1,0 +1,183 @@
+// Cells that come near each other and near walls, coupling.scheme = "force".
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "core/error.hpp"
+#include "coupling/energy_balance.hpp"
+#include "coupling/restart.hpp"
+#include "scenes.hpp"
+
+using namespace corpuscle;
+using namespace corpuscle::scenes;
+
+namespace {
+
+using Type = BoundarySettings::Type;
+
+/// Two red cells face to face, `gap` apart, pressed together along z; periodic all round.
+Case pressed_cells(double gap_um, double push_nN, double step_us, double end_us, double spacing = 0.6) {
+  constexpr double thickness = 2.6;  // um, of a cell at its rim
+  Case scene;
+  scene.time = {step_us, end_us};
+  GridSettings grid;
+  const int n = static_cast<int>(std::lround(12 / spacing));
+  grid.nodes = {n + 1, n + 1, n + 1};
+  grid.lower_um = {-6, -6, -6}, grid.upper_um = {6, 6, 6};
+  scene.grid = grid;
+  scene.fluid = FluidSettings{};
+  scene.fluid->convection = FluidSettings::Convection::none;
+  scene.boundaries = sides(Type::periodic);
+  for (int c = 0; c < 2; ++c) {
+    CellSettings cell;
+    cell.vertices = 300;
+    cell.center_um = {0.05, -0.03, (c == 0 ? -0.5 : 0.5) * (thickness + gap_um)};
+    cell.spin_deg = 17.0 * c;
+    cell.push_nN = {0, 0, c == 0 ? push_nN : -push_nN};
+    scene.cells.push_back(cell);
+  }
+  scene.coupling = CouplingSettings{};
+  scene.coupling->scheme = CouplingSettings::Scheme::force;
+  scene.contact = ContactSettings{};
+  return scene;
+}
+
+double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("two cells pressed face to face do not cross, keep their volume, and the energy balances",
+          "[coupling][contact]") {
+  // From where the film drains, and from where contact acts at once; steps of half the largest stable one and more.
+  struct Setting {
+    double gap, push, step, end, balance;
+  };
+  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.04});
+  Timers timers;
+  FlowSimulation simulation(Comm(), pressed_cells(s.gap, s.push, s.step, s.end), timers);
+  EnergyBalance energy(simulation);
+  const auto elastic = [&] {
+    double sum = 0;
+    for (const auto& cell : simulation.membranes()->diagnostics()) sum += cell.energy_fJ();
+    return simulation.grid().comm().sum(sum);
+  };
+  energy.sample(elastic());
+  while (!simulation.done()) {
+    simulation.step();
+    energy.sample(elastic());
+  }
+  const auto contact = *simulation.coupling()->contact_report();
+  const auto cells = simulation.membranes()->diagnostics();
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("gap {:.3f} um, {} crossed, {} lists, energy off by {:.4f} of {:.3g} fJ", contact.smallest_gap,
+                     contact.crossings, contact.lists, *energy.imbalance(), energy.largest_fJ()));
+  CHECK(contact.crossings == 0);
+  CHECK(contact.smallest_gap > 0);
+  CHECK(contact.smallest_gap < s.gap + 0.045);  // the first cell is 2.56 um thick
+  for (const auto& cell : cells) {
+    CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-4));
+    CHECK(cell.area_um2 == Approx(cell.rest_area_um2).epsilon(0.03));
+  }
+  // Most of it of the first steps: the load is sudden, and the work of a step is that of its ends.
+  CHECK(*energy.imbalance() < s.balance);
+}
+
+TEST_CASE("cells that cross in a run are put back and counted, and the run goes on", "[coupling][contact]") {
+  Timers timers;
+  FlowSimulation simulation(Comm(), pressed_cells(0.15, 0.2, 20, 400), timers);
+  const auto coupling = simulation.coupling();
+  simulation.step();
+  CHECK(coupling->contact_report()->crossings == 0);
+  // As if a step had gone wrong: the second cell a little into the first.
+  const auto& set = *simulation.surfaces();
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.x);
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.first_vertex);
+  const auto& own = simulation.shared_cells()->own();
+  for (std::size_t c = 0; c < own.size(); ++c)
+    for (int v = first(c); own[c].number == 1 && v < first(c + 1); ++v) x(v, 2) -= 0.25;
+  Kokkos::deep_copy(set.x, x);
+  simulation.step();
+  const long crossings = coupling->contact_report()->crossings;
+  CHECK(crossings > 0);
+  while (!simulation.done()) simulation.step();
+  CHECK(coupling->contact_report()->crossings == crossings);
+  for (const auto& cell : simulation.membranes()->diagnostics())
+    CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-3));
+}
+
+TEST_CASE("cells at rest that do not touch stay as if there were no contact", "[coupling][contact]") {
+  Case with = pressed_cells(0.6, 0, 20, 200), without = with;
+  without.contact.reset();
+  Timers timers;
+  FlowSimulation a(Comm(), with, timers), b(Comm(), without, timers);
+  while (!a.done()) a.step(), b.step();
+  // 0.6 um apart with a spacing of 0.6 um: only their slip is less.
+  CHECK(largest_difference(positions(a), positions(b)) < 1e-3);
+  with.coupling->slip = without.coupling->slip = false;
+  FlowSimulation c(Comm(), with, timers), d(Comm(), without, timers);
+  while (!c.done()) c.step(), d.step();
+  CHECK(largest_difference(positions(c), positions(d)) == 0);
+}
+
+TEST_CASE("a cell pressed against a wall stays off it", "[coupling][contact]") {
+  Case scene = pressed_cells(0.6, 0, 20, 3000);
+  scene.cells.resize(1);
+  for (int side : {4, 5}) scene.boundaries[side].type = Type::wall;
+  scene.cells[0].center_um = {0.05, -0.03, -4.3};
+  scene.cells[0].push_nN = {0, 0, -0.5};
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  while (!simulation.done()) simulation.step();
+  for (const auto& cell : simulation.membranes()->diagnostics()) {  // on the rank that has it
+    if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("lowest {:.4f} um above the wall", cell.lower_um[2] + 6));
+    CHECK(cell.lower_um[2] > -6);
+    CHECK(cell.lower_um[2] < -6 + 0.25);  // it has come to where the wall repels
+    CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-4));
+  }
+}
+
+#ifdef CORPUSCLE_HDF5
+TEST_CASE("pressed cells go on from a checkpoint with the same bits", "[coupling][contact][restart]") {
+  std::string name = "corpuscle_contact_" + std::to_string(getpid()) + ".h5";
+  Comm().broadcast(name);  // one file of all ranks
+  const auto file = std::filesystem::temp_directory_path() / name;
+  const Case scene = pressed_cells(0.15, 0.5, 20, 600);
+  Timers timers;
+  FlowSimulation whole(Comm(), scene, timers), after(Comm(), scene, timers);
+  CheckpointTexts texts;
+  texts.resolved = "title = \"a\"\n", texts.totals = "{}";
+  while (!whole.done()) {
+    whole.step();
+    if (whole.steps() != 18) continue;
+    write_checkpoint(file.string(), whole, texts);
+    read_checkpoint(file.string(), after, texts.resolved, "");
+  }
+  while (!after.done()) after.step();
+  if (Comm().rank() == 0) std::filesystem::remove(file);
+  CHECK(whole.coupling()->contact_report()->smallest_gap < 0.25);
+  CHECK(positions(whole) == positions(after));
+}
+#endif
+
+#ifdef CORPUSCLE_MPI
+TEST_CASE("pressed cells on several ranks move as on one", "[coupling][contact][ranks]") {
+  if (Comm().size() == 1) return;
+  Case scene = pressed_cells(0.15, 0.5, 20, 400, 0.75);
+  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
+  for (int side : {2, 3}) scene.boundaries[side].type = Type::wall;
+  for (auto& cell : scene.cells) cell.center_um[1] = 1.95;  // near a wall as well
+  Timers timers;
+  FlowSimulation alone(Comm(MPI_COMM_SELF), scene, timers), shared(Comm(), scene, timers);
+  while (!alone.done()) alone.step(), shared.step();
+  CHECK(alone.coupling()->contact_report()->smallest_gap < 0.25);
+  CHECK(alone.coupling()->contact_energy(20) > 0);
+  CHECK(largest_difference(positions(alone), positions(shared)) <
+        1e-9);  // um: round-off, and the solvers' last residuals
+}
+#endif
