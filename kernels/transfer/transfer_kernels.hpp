@@ -24,14 +24,46 @@ KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double
       }
 }
 
+/// Area of the face `c` of direction d as the kernel sees it. Where a marker that reaches this block's first faces reaches a row beyond the halo on
+/// its other side, as the four-point kernel does, that is the line through the last two rows: exact where faces are alike.
+KOKKOS_INLINE_FUNCTION Vec3 seen_area(const TransferBlock& block, int d, int c, const int (&row)[3]) {
+  constexpr int halo = IndexSpace::halo;
+  const IndexSpace& index = block.index();
+  int inward[3];
+  bool within = true;
+  for (int e = 0; e < 3; ++e) {
+    inward[e] = row[e] < -halo ? 1 : (row[e] >= index.n[e] + halo ? -1 : 0);
+    within = within && inward[e] == 0;
+  }
+  if (within) return load(block.sharp_area[d], c);
+  Vec3 sum;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1;
+    int at[3];
+    for (int e = 0; e < 3; ++e) {
+      const int second = corner >> e & 1;
+      at[e] = row[e] + (1 + second) * inward[e];
+      weight *= inward[e] == 0 ? 1 - second : (second ? -1 : 2);
+    }
+    if (weight != 0) sum += weight * load(block.sharp_area[d], index.cell(at[0], at[1], at[2]));
+  }
+  return sum;
+}
+
 /// The inverse of the matrix of face areas that a marker sees: dual.b[d] goes with the faces of direction d.
 template <class Delta>
 KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const double (&eta)[3]) {
   Vec3 seen[3];
   for (int d = 0; d < 3; ++d) {
     Vec3 sum;
+<<<<<<< HEAD
     visit_faces<Delta>(block, eta, d,
                        [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.sharp_area[d], c); });
+=======
+    visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&)[3]) {
+      sum += w * (Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c));
+    });
+>>>>>>> owners
     seen[d] = sum;
   }
   return DualBasis(seen[0], seen[1], seen[2]);

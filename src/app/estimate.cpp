@@ -99,6 +99,37 @@ double vertices_of(const BodySettings& body, const SceneSize& size) {
   return std::clamp(4 * std::acos(-1.0) * largest * largest / (0.87 * h2), 162.0, 100000.0);
 }
 
+/// From a cell's middle to its end, um; zero for one from a file.
+double reach_of(const CellSettings& cell) {
+  if (!cell.mesh.empty()) return 0;
+  switch (cell.shape) {
+    case CellSettings::Shape::sphere: return cell.radius_um;
+    case CellSettings::Shape::ellipsoid: return *std::max_element(cell.semi_axes_um.begin(), cell.semi_axes_um.end());
+    default: return 0.5 * cell.diameter_um;
+  }
+}
+
+double vertices_of(const CellSettings& cell) { return cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh); }
+
+/// A rank's share of cells that are spread evenly, whole ones; and the copies of those that reach into its block and what it
+/// must know of around it, where others lie or the domain goes on.
+void share_cells(const Case& scene, int ranks, SceneSize& size) {
+  if (scene.cells.empty()) return;
+  const auto count = static_cast<double>(scene.cells.size());
+  double all = 0, reach = 0;
+  for (const auto& cell : scene.cells) {
+    all += vertices_of(cell);
+    reach = std::max(reach, reach_of(cell));
+  }
+  const double share = std::ceil(count / ranks);
+  double around = 1;  // the volume in which cells are copied or own over the block's
+  for (int d = 0; d < 3; ++d)
+    if (size.cut[d] || size.periodic[d])
+      around *= 1 + 2 * ((halo + 1) * size.spacing[d] + reach) / (size.block[d] * size.spacing[d]);
+  size.own = all * share / count;
+  size.copies = all / count * std::min(share * (around - 1), count * size.images - share);
+}
+
 /// Cells of all multigrid levels over those of the finest, halos included; `coarsest`: of the last one.
 /// The same choices as MultigridHierarchy's, on mean spacings.
 double levels_over_finest(const SceneSize& size) {
@@ -123,10 +154,19 @@ double levels_over_finest(const SceneSize& size) {
 }
 
 /// @throws InputError  if `count` reaches two to the power of 31
-void require_below(double count, const char* what, const char* remedy, double limit = 2147483647.0) {
+void require_below(double count, const char* what, const char* remedy, const char* key = "grid.nodes") {
+  constexpr double limit = 2147483647.0;
   if (count <= limit) return;
-  throw InputError(fmt::format("grid.nodes: {} would be {:.3g}, and the program counts them up to {:.3g} on a rank: {}", what,
-                               count, limit, remedy));
+  throw InputError(fmt::format("{}: {} would be {:.3g}, and the program counts them up to {:.3g} on a rank: {}", key, what, count,
+                               limit, remedy));
+}
+
+/// Bytes on a rank.
+double of_shared_cells(const Case& scene, const SceneSize& size) {
+  // Of a vertex and its two triangles: surface, places and markers; of an own one, motion and the room of the forces' parts.
+  double vertex = 310, own = 260;
+  if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
+  return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }
 
 }  // namespace
@@ -138,8 +178,12 @@ double SceneSize::padded() const {
 SceneSize measure_scene(const Case& scene, int ranks) {
   SceneSize size;
   if (scene.grid) measure_grid(scene, ranks, size);
-  for (const auto& cell : scene.cells) size.vertices += cell.mesh.empty() ? cell.vertices : vertices_in_file(cell.mesh);
+  for (const auto& cell : scene.cells) size.vertices += vertices_of(cell);
   for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
+  size.cells_listed = static_cast<double>(scene.cells.size());
+  size.shared = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
+  size.own = size.vertices;
+  if (size.shared) share_cells(scene, ranks, size);
   return size;
 }
 
@@ -151,9 +195,16 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double grid = 24 + 72 + 8 + 1;                                  // Grid: centres, faces, volumes, kinds
   const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
   const double krylov = 5 * 12;                                         // FluidSolver::Momentum
+<<<<<<< HEAD
   const double search = surfaces ? 51 : 0;                              // ImmersedBoundary
   const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 8 + 3 * 4 : 0;                        // Cytosol
+=======
+  // Transfer: of a kernel that is sharpened twice the faces once more, and other areas on grids that are not uniform.
+  const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
+  const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
+  const double search = size.shared ? 29 + sharpening : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
+>>>>>>> owners
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;
@@ -175,9 +226,13 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
       if (size.cut[d]) faces = std::max(faces, nodes / (size.block[d] + 2 * halo) * halo);
     mb.output += faces * 3 * 8 * 4 / bytes_per_mb;
   }
-  // Geometry, motion, tractions and search of a vertex and its two triangles; its places under each image; the rows of the
-  // two immersed nodes beside it, with 16 entries for the velocity and for the pressure.
-  mb.surfaces = size.vertices * (1500 + 60 * size.images + 2 * 2 * 16 * 12) / bytes_per_mb;
+  if (size.shared) {
+    mb.surfaces = of_shared_cells(scene, size) / bytes_per_mb;
+  } else {
+    // Geometry, motion, tractions and search of a vertex and its two triangles; its places under each image; the rows of the
+    // two immersed nodes beside it, with 16 entries for the velocity and for the pressure.
+    mb.surfaces = size.vertices * (1500 + 60 * size.images + 2 * 2 * 16 * 12) / bytes_per_mb;
+  }
   return mb;
 }
 
@@ -193,6 +248,10 @@ void require_countable(const SceneSize& size, int ranks) {
     require_below(size.owned() * 19, "the matrix entries of a rank on a skewed grid", more);
     require_below(size.cells[0] * size.cells[1] * size.cells[2], "the rows of the pressure matrix on a skewed grid",
                   "use fewer nodes (grid.nodes), or a grid without skewness");
+  }
+  if (size.shared) {
+    require_below(3 * 2 * (size.own + size.copies), "the corners of triangles", "use more ranks or fewer cells", "cells");
+    return;
   }
   // Triangles are twice the vertices; the search numbers them together with the images under which they are seen.
   if (2 * size.vertices * size.images > 2147483647.0 || 3 * size.vertices > 2147483647.0)
@@ -217,9 +276,12 @@ MemoryEstimate require_memory(const Comm& comm, const Case& scene) {
   if (comm.max(needed - at_hand) > 0) {
     const double most = comm.max(needed), least = comm.min(at_hand);
     const std::string shared = comm.size() == 1 ? "" : fmt::format(" for {} ranks on one machine", comm.max(neighbours));
+    const bool of_cells = estimate.surfaces > 0.5 * estimate.rank();
     throw InputError(fmt::format(
-        "grid.nodes: {} grid cells need about {:.3g} GB of memory{}, and {:.3g} GB are at hand: use fewer nodes, or {}",
-        fmt::format("{:.0f} x {:.0f} x {:.0f}", size.cells[0], size.cells[1], size.cells[2]), most / 1024, shared, least / 1024,
+        "{} need about {:.3g} GB of memory{}, and {:.3g} GB are at hand: use fewer {}, or {}",
+        of_cells ? fmt::format("cells, bodies: {:.0f} vertices", size.vertices)
+                 : fmt::format("grid.nodes: {:.0f} x {:.0f} x {:.0f} grid cells", size.cells[0], size.cells[1], size.cells[2]),
+        most / 1024, shared, least / 1024, of_cells ? "vertices" : "nodes",
         comm.size() == 1 ? "ranks on more machines (mpirun)" : "more machines"));
   }
   require_countable(size, comm.size());

@@ -16,6 +16,9 @@ struct SceneSize {
   bool sampled = true;               // skewness and spacing are the grid's; false: of a file that was not read
   double vertices = 0;               // of all surfaces
   double images = 1;                 // under which each surface is seen: 3 for every periodic direction
+  double cells_listed = 0;           // cells of the whole scene
+  bool shared = false;               // cells are shared out over ranks: coupling.scheme = "force"
+  double own = 0, copies = 0;        // vertices that a rank holds, of its own cells and of copies of others; all without sharing
 
   double owned() const { return block[0] * block[1] * block[2]; }
   /// With the halo.
@@ -56,7 +59,7 @@ struct RunSize {
   double steps = 0, cores = 1;
 };
 
-/// Of a scene's set-up, most of which goes into meshes, on one core, s.
+/// Of a scene's set-up, most of which goes into meshes of so many vertices, on one core, s.
 double estimate_set_up_s(double vertices);
 /// Of all steps, s: within a factor of two or so, of which grid, surfaces and cores account for as much each.
 double estimate_steps_s(const RunSize& size);

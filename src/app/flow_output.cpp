@@ -67,10 +67,10 @@ double poor_share(const std::vector<long>& fits) {
 
 }  // namespace
 
-FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
+FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers,
                        std::optional<double> restart_us, std::chrono::steady_clock::time_point start)
-    : folder_(place.folder), run_(place.run), files_(place.files), scene_(scene), simulation_(simulation), timers_(timers),
-      restart_us_(restart_us), start_(start), energy_(simulation) {
+    : folder_(place.folder), run_(place.run), files_(place.files), scene_(std::move(scene)), simulation_(simulation),
+      timers_(timers), restart_us_(restart_us), start_(start), energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
@@ -79,14 +79,14 @@ FlowOutput::FlowOutput(const Place& place, const Case& scene, FlowSimulation& si
   if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
   if (simulation.coupling()) history_ = std::make_unique<HistoryWriter>(folder_, comm, columns, restart_us);
 #ifdef CORPUSCLE_HDF5
-  if (scene.output.fields)
+  if (scene_.output.fields)
     fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
                                             simulation.grid().owned_nodes().data(), restart_us);
   few_cells_ = simulation.cells() <= few_cells || !simulation.shared_cells();
-  if (!few_cells_) scene_.cells = {};
-  if (scene.output.cells && simulation.shared_cells()) {
+  if (!few_cells_) std::vector<CellSettings>().swap(scene_.cells);  // nothing on a rank grows with the number of all cells
+  if (scene_.output.cells && simulation.shared_cells()) {
     cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
-  } else if (scene.output.cells && simulation.surfaces()) {
+  } else if (scene_.output.cells && simulation.surfaces()) {
     const auto& set = *simulation.surfaces();
     const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
     const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);

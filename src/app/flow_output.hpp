@@ -19,7 +19,7 @@ class FlowOutput {
  public:
   /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
   /// @param start       when the program began this run
-  FlowOutput(const Place& place, const Case& scene, FlowSimulation& simulation, Timers& timers,
+  FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers,
              std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first

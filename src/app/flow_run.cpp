@@ -152,7 +152,7 @@ void print_schedule(const StepSchedule& schedule) {
   info("steps: {}; {} in all", text, schedule.steps_from(0));
 }
 
-Ending run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const Place& place) {
+Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const Place& place) {
   const auto start = Clock::now();
   Timers timers;
   StopSignal signal(comm);
@@ -166,7 +166,7 @@ Ending run_flow(const Comm& comm, const Case& scene, const RunOptions& options, 
   std::unique_ptr<FlowOutput> output;
   Progress progress(scene.time.end_us, simulation.steps_left());
   try {
-    output = std::make_unique<FlowOutput>(place, scene, simulation, timers,
+    output = std::make_unique<FlowOutput>(place, std::move(scene), simulation, timers,
                                           totals ? std::optional(simulation.time()) : std::nullopt, start);
     if (totals) {
       on_root(comm, [&] { std::filesystem::remove(place.folder + "/report.json"); });  // of the run until the checkpoint

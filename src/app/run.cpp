@@ -61,8 +61,8 @@ void print_end(const Ending& ending, const std::string& folder) {
   info("results in {}", folder);
 }
 
-Ending run_scene(const Comm& comm, const Case& scene, const RunOptions& options, const Place& place) {
-  return scene.stretching ? run_stretching(comm, scene, place) : run_flow(comm, scene, options, place);
+Ending run_scene(const Comm& comm, Case scene, const RunOptions& options, const Place& place) {
+  return scene.stretching ? run_stretching(comm, scene, place) : run_flow(comm, std::move(scene), options, place);
 }
 
 /// Every rank gets the same text, whatever happens to the file between their readings.
@@ -101,12 +101,12 @@ ExitCode estimate_errors(const Comm& comm, const Bars& bars, const Place& main, 
     const std::string own_folder = folder + "/coarser_" + run.kind;
     std::string reason;
     try {
-      const Case coarser = read_case(bars.file, overrides);
+      Case coarser = read_case(bars.file, overrides);
       const auto files = fingerprint_files(comm, coarser);
       require_same_files(main.files, files);
       const auto begin = [&] { on_root(comm, [&] { prepare_folder(own_folder), remove_results(own_folder); }); };
       open_log(comm.root(), true);
-      const Ending ending = run_scene(comm, coarser, {}, {own_folder, begin, main.run + "-" + run.kind, files});
+      const Ending ending = run_scene(comm, std::move(coarser), {}, {own_folder, begin, main.run + "-" + run.kind, files});
       open_log(comm.root());
       if (ending.code != exit_done) reason = ending.report.stopped;
       if (ending.code == exit_stopped) code = exit_stopped;
@@ -171,7 +171,7 @@ std::optional<Continued> continued([[maybe_unused]] const std::string& checkpoin
 ExitCode run_case(const Comm& comm, const RunOptions& asked) {
   RunOptions options = asked;
   const CaseFile file = case_file(comm, options);
-  const Case scene = read_case(file, options.overrides);
+  Case scene = read_case(file, options.overrides);
   const MemoryEstimate memory = require_memory(comm, scene);
   check_options(comm, scene, options);
   const auto coarser = options.estimate.empty() ? std::vector<CoarserRun>{} : coarser_runs(scene, options.estimate);
@@ -183,9 +183,9 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
                    continued(options.restart));
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
-  announce_set_up(measure_scene(scene, comm.size()).vertices);
+  announce_set_up(measure_scene(scene, comm.size()).own);
   const Place place{folder.path(), [&] { folder.begin(); }, folder.run(), fingerprint_files(comm, scene)};
-  Ending ending = run_scene(comm, scene, options, place);
+  Ending ending = run_scene(comm, std::move(scene), options, place);
   if (!coarser.empty() && ending.code == exit_done)
     ending.code = estimate_errors(comm, {file, options.overrides, coarser}, place, ending.report);
   print_end(ending, folder.path());
@@ -198,14 +198,14 @@ void check_case(const Comm& comm, const RunOptions& options) {
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   if (scene.stretching) {
-    announce_set_up(measure_scene(scene, 1).vertices);
+    announce_set_up(measure_scene(scene, 1).own);
     Membranes membranes(scene.cells);
     info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
     info("estimate: {:.0f} MB, {:.2g} s", memory.rank(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
     info("{} is valid", scene.path);
     return;
   }
-  announce_set_up(measure_scene(scene, comm.size()).vertices);
+  announce_set_up(measure_scene(scene, comm.size()).own);
   Timers timers;
   const auto start = std::chrono::steady_clock::now();
   FlowSimulation simulation(comm, scene, timers);

@@ -29,9 +29,10 @@ Report start_report(const Comm& comm, const Case& scene);
 void print_schedule(const StepSchedule& schedule);
 
 /// Both write the report, also where the computation breaks down.
+/// @param scene  given away, since the list of many cells is not to stay on every rank
 /// @throws InputError        before anything in the folder has changed
 /// @throws ComputationError
-Ending run_flow(const Comm& comm, const Case& scene, const RunOptions& options, const Place& place);
+Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const Place& place);
 Ending run_stretching(const Comm& comm, const Case& scene, const Place& place);
 
 }  // namespace corpuscle

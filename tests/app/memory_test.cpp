@@ -32,6 +32,19 @@ SceneSize block(double cells, double ranks) {
   return size;
 }
 
+/// Red cells in layers of four in a channel that is periodic along z, one layer every 3 um; spacing 1 um.
+std::string write_layers(const fs::path& folder, int layers, bool contact) {
+  std::ofstream out(folder / "layers.toml");
+  out << "[time]\nstep_us = 5\nend_us = 10\n[grid]\ngenerator = \"box\"\nnodes = [21, 21, " << 3 * layers + 1
+      << "]\nlower_um = [0, 0, 0]\nupper_um = [20, 20, " << 3 * layers << "]\n[fluid]\nconvection = false\n";
+  for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"})
+    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"" << (side[0] == 'k' ? "periodic" : "wall") << "\"\n";
+  for (int n = 0; n < 4 * layers; ++n)
+    out << "[[cells]]\ncenter_um = [" << (n % 2 ? 15 : 5) << ", " << (n / 2 % 2 ? 15 : 5) << ", " << 3 * (n / 4) + 1.5 << "]\n";
+  out << "[coupling]\nscheme = \"force\"\n" << (contact ? "[contact]\n" : "");
+  return (folder / "layers.toml").string();
+}
+
 }  // namespace
 
 TEST_CASE("memory is announced within a quarter of what a run takes") {
@@ -61,6 +74,45 @@ TEST_CASE("memory is announced within a quarter of what a run takes") {
     // The libraries' own share differs between machines by some MB, allocators round up, and set-up has its moments.
     CHECK(foretold == Approx(taken).epsilon(0.25));
   }
+}
+
+TEST_CASE("memory of cells that ranks share out is announced within a quarter of what a run takes") {
+  const auto folder = fresh_folder("memory_of_cells");
+  struct Scene {
+    int layers, ranks;
+    bool contact;
+  };
+#ifdef CORPUSCLE_MPI
+  const std::vector<Scene> scenes{{48, 1, false}, {48, 2, true}};
+#else
+  const std::vector<Scene> scenes{{48, 1, false}};
+#endif
+  for (const auto& s : scenes) {
+    fs::remove_all(folder / "out");
+    const auto name = write_layers(folder, s.layers, s.contact);
+    const auto outcome = succeed(folder, {"run", name, "--out", "out"}, {.threads = 1, .ranks = s.ranks});
+    const double foretold = announced(outcome.output), taken = report(folder / "out")["peak_rss_mb"];
+    INFO(s.ranks << " ranks: " << foretold << " MB announced, " << taken << " taken\n" << outcome.output);
+    CHECK(foretold == Approx(taken).epsilon(0.25));
+  }
+}
+
+TEST_CASE("a rank's memory for cells is that of its share") {
+  const auto folder = fresh_folder("memory_of_share");
+  const auto size_of = [&](int layers, int ranks) {
+    return corpuscle::measure_scene(corpuscle::read_case(write_layers(folder, layers, false)), ranks);
+  };
+  const auto one = size_of(80, 1), four = size_of(80, 4);
+  CHECK(one.own == one.vertices);
+  CHECK(four.own == one.own / 4);
+  CHECK(four.copies < 0.5 * four.own);
+  CHECK(four.copies == one.copies);  // those of two ends
+  const auto longer = size_of(160, 8);
+  CHECK(longer.vertices == 2 * one.vertices);
+  CHECK(longer.own + longer.copies == Approx(four.own + four.copies));
+  Case scene = corpuscle::read_case(write_layers(folder, 80, false));
+  scene.coupling->scheme = corpuscle::CouplingSettings::Scheme::robin;
+  CHECK(corpuscle::measure_scene(scene, 4).own == one.vertices);  // every rank has every cell
 }
 
 TEST_CASE("a scene that does not fit is refused at once") {
@@ -100,6 +152,10 @@ TEST_CASE("counts beyond 32 bits are refused with the figure") {
   REQUIRE_NOTHROW(corpuscle::require_countable(many, 1));
   many.images = 27;
   REQUIRE_THROWS_WITH(corpuscle::require_countable(many, 1), Contains("triangles under 27 periodic images"));
+  many.shared = true, many.own = 4e7, many.copies = 4e6;  // whatever others have
+  REQUIRE_NOTHROW(corpuscle::require_countable(many, 1));
+  many.own = 4e8;
+  REQUIRE_THROWS_WITH(corpuscle::require_countable(many, 1), Contains("cells: the corners of triangles") && Contains("more ranks"));
 }
 
 TEST_CASE("a limit of the process counts as the memory at hand") {

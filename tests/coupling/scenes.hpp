@@ -4,7 +4,10 @@
 #include "cells/shared_cells.hpp"
 #include "coupling/flow_simulation.hpp"
 
+#include <unistd.h>
+
 #include <cmath>
+#include <filesystem>
 
 namespace corpuscle::scenes {
 
@@ -58,6 +61,33 @@ inline Case tube_with_cell(int n, int nk, double mass_pg, CouplingSettings::Sche
   scene.coupling->scheme = scheme;
   return scene;
 }
+
+/// Of positions one after the other, the first ones moved by `shift`.
+inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b, const Triple& shift = {}) {
+  double most = a.size() == b.size() ? 0 : 1e300;
+  for (std::size_t i = 0; i < a.size() && i < b.size(); ++i) most = std::max(most, std::abs(a[i] - b[i] + shift[i % 3]));
+  return most;
+}
+
+/// A file of all ranks together, which no other run of the tests has. Every rank calls.
+class SharedFile {
+ public:
+  explicit SharedFile(const std::string& name) {
+    std::string unique = "corpuscle_" + name + "_" + std::to_string(::getpid()) + ".h5";
+    Comm().broadcast(unique);
+    path_ = std::filesystem::temp_directory_path() / unique;
+  }
+  ~SharedFile() {
+    Comm().barrier();
+    if (Comm().root()) std::filesystem::remove(path_);
+  }
+  SharedFile(const SharedFile&) = delete;
+  SharedFile& operator=(const SharedFile&) = delete;
+  std::string path() const { return path_.string(); }
+
+ private:
+  std::filesystem::path path_;
+};
 
 /// Positions of every cell's vertices, moved on by the periods that it has been moved back, on every rank.
 inline std::vector<double> positions(FlowSimulation& simulation) {

@@ -1,9 +1,7 @@
 // Cells that come near each other and near walls, coupling.scheme = "force".
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
-#include <filesystem>
 
 #include "core/error.hpp"
 #include "coupling/energy_balance.hpp"
@@ -42,12 +40,6 @@ Case pressed_cells(double gap_um, double push_nN, double step_us, double end_us,
   scene.coupling->scheme = CouplingSettings::Scheme::force;
   scene.contact = ContactSettings{};
   return scene;
-}
-
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double most = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
-  return most;
 }
 
 }  // namespace
@@ -144,9 +136,7 @@ TEST_CASE("a cell pressed against a wall stays off it", "[coupling][contact]") {
 
 #ifdef CORPUSCLE_HDF5
 TEST_CASE("pressed cells go on from a checkpoint with the same bits", "[coupling][contact][restart]") {
-  std::string name = "corpuscle_contact_" + std::to_string(getpid()) + ".h5";
-  Comm().broadcast(name);  // one file of all ranks
-  const auto file = std::filesystem::temp_directory_path() / name;
+  const SharedFile file("contact");
   const Case scene = pressed_cells(0.15, 0.5, 20, 600);
   Timers timers;
   FlowSimulation whole(Comm(), scene, timers), after(Comm(), scene, timers);
@@ -155,11 +145,10 @@ TEST_CASE("pressed cells go on from a checkpoint with the same bits", "[coupling
   while (!whole.done()) {
     whole.step();
     if (whole.steps() != 18) continue;
-    write_checkpoint(file.string(), whole, texts);
-    read_checkpoint(file.string(), after, texts.resolved, "");
+    write_checkpoint(file.path(), whole, texts);
+    read_checkpoint(file.path(), after, texts.resolved, "");
   }
   while (!after.done()) after.step();
-  if (Comm().rank() == 0) std::filesystem::remove(file);
   CHECK(whole.coupling()->contact_report()->smallest_gap < 0.25);
   CHECK(positions(whole) == positions(after));
 }

@@ -63,12 +63,6 @@ Run run(const Case& scene) {
   return result;
 }
 
-double largest_difference(const std::vector<double>& a, const std::vector<double>& b, const Triple& shift = {}) {
-  double most = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i] + shift[i % 3]));
-  return most;
-}
-
 std::string refusal(const Case& scene) {
   try {
     Timers timers;

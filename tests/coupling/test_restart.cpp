@@ -5,9 +5,7 @@
 #include "scenes.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <functional>
 
 namespace corpuscle {
@@ -50,15 +48,14 @@ namespace {
 /// A run to `until` and its checkpoint, taken up by a run of another case.
 void take_up(const Case& before, double until, const std::string& resolved_before, Run& after, const std::string& resolved_after,
              const std::function<void(FlowSimulation&)>& compare = {}) {
-  const auto file = std::filesystem::temp_directory_path() / ("corpuscle_restart_" + std::to_string(getpid()) + ".h5");
+  const scenes::SharedFile file("restart");
   Run run(before);
   while (run.simulation.time() < until) run.simulation.step();
   CheckpointTexts texts;
   texts.resolved = resolved_before;
   texts.totals = "{}";
-  write_checkpoint(file.string(), run.simulation, texts);
-  read_checkpoint(file.string(), after.simulation, resolved_after, "");
-  std::filesystem::remove(file);
+  write_checkpoint(file.path(), run.simulation, texts);
+  read_checkpoint(file.path(), after.simulation, resolved_after, "");
   if (compare) compare(run.simulation);
 }
 
@@ -66,7 +63,7 @@ const std::string plain = "title = \"a\"\n";
 
 }  // namespace
 
-TEST_CASE("convection begins at a restart with the fluxes that the flow has", "[coupling][restart]") {
+TEST_CASE("convection begins at a restart with the fluxes that the flow has", "[coupling][restart][ranks]") {
   Case without = tube(8), with = tube(8);
   for (Case* scene : {&without, &with}) scene->cells.clear(), scene->coupling.reset();
   with.fluid->convection = FluidSettings::Convection::extrapolated;

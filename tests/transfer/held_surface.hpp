@@ -1,5 +1,5 @@
 // A closed surface held in place in a fluid at rest at infinity, and given forces on its vertices: what the flow does with
-// them.
+// them. Every rank has all of the surface, and its part of the grid.
 #pragma once
 
 #include <algorithm>
@@ -63,6 +63,10 @@ class HeldSurface {
   void take_velocity(bool slip) {
     const SlipViews correction = transfer.slip(surface, force, fluid.viscosity());
     transfer.interpolate(fluid.flux(), fluid.velocity(), slip ? &correction : nullptr, velocity);
+    const auto sum = Kokkos::create_mirror(velocity);  // of the ranks' parts
+    Kokkos::deep_copy(sum, velocity);
+    grid.comm().sum(sum.data(), static_cast<int>(sum.size()));
+    Kokkos::deep_copy(velocity, sum);
   }
 
   double largest_vertex_speed() const {
@@ -80,7 +84,7 @@ class HeldSurface {
     for (int i = 0; i < surface.vertices; ++i) sum += a(i) * load(v, i), area += a(i);
     return (1 / area) * sum;
   }
-  /// Calls body(centre, pressure, velocity) for every cell.
+  /// Calls body(centre, pressure, velocity) for every cell of this rank.
   template <class Body>
   void visit_cells(const Body& body) {
     const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid.views().x);

@@ -33,8 +33,7 @@ Rest at_rest(HeldSurface& held, const Triple& semi_axes, double h, int steps) {
   held.settle(steps, 40 * h * h);
   Rest rest;
   rest.at_vertices = held.largest_vertex_speed();
-  double inside = 0, outside = 0;
-  int within = 0, without = 0;
+  double inside = 0, outside = 0, within = 0, without = 0;
   held.visit_cells([&](const Vec3& x, double p, const Vec3& u) {
     rest.in_cells = std::max(rest.in_cells, norm(u));
     const double r =
@@ -43,13 +42,16 @@ Rest at_rest(HeldSurface& held, const Triple& semi_axes, double h, int steps) {
     if (distance < -2 * h) inside += p, ++within;
     if (distance > 2 * h) outside += p, ++without;
   });
+  const Comm& comm = held.grid.comm();
+  rest.in_cells = comm.max(rest.in_cells);
+  for (double* sum : {&inside, &outside, &within, &without}) *sum = comm.sum(*sum);
   rest.jump = outside / without - inside / within;
   return rest;
 }
 
 }  // namespace
 
-TEST_CASE("membranes under a uniform normal load leave the fluid at rest", "[transfer]") {
+TEST_CASE("membranes under a uniform normal load leave the fluid at rest", "[transfer][ranks]") {
   const int n = 20;
   const double h = 0.2;
   auto nodes = box({n, n, n}, {2, 2, 2});

@@ -55,6 +55,20 @@ Components<double> inside(int count, double edge, bool warped) {
   });
 }
 
+/// What all ranks have found of the points together.
+auto sum_of_ranks(const Components<double>& part) {
+  const auto sum = Kokkos::create_mirror(part);
+  Kokkos::deep_copy(sum, part);
+  Comm().sum(sum.data(), static_cast<int>(sum.size()));
+  return sum;
+}
+
+/// No two are alike, nor near each other; of a face the same on every rank that has it.
+Triple rough(const Triple& p) {
+  return {std::sin(31 * p[0] - 17 * p[1] + 23 * p[2]), std::cos(29 * p[0] + 37 * p[1] - 13 * p[2]),
+          std::sin(19 * p[0] + 11 * p[1] + 41 * p[2] + 1)};
+}
+
 /// Fluxes of a velocity given at face centres, and the velocity on the sides.
 struct Field {
   Array<double> flux[3];
@@ -63,6 +77,7 @@ struct Field {
 Field make_field(const Grid& grid, const std::function<Triple(const Triple&)>& velocity) {
   const IndexSpace& index = grid.index();
   Field field;
+  const Lattice lattice = make_lattice(grid.views());
   field.u = Components<double>("corpuscle::test::u", index.size(), 3);
   const auto x = on_host(grid.views().x);
   const auto u = Kokkos::create_mirror_view(field.u);
@@ -83,9 +98,9 @@ Field make_field(const Grid& grid, const std::function<Triple(const Triple&)>& v
           const int at[3] = {i, j, k};
           Triple centre;
           for (int m = 0; m < 3; ++m)  // beyond a side lies the side itself
-            centre[m] = at[d] == 0 && !index.periodic[d]            ? x(low, m)
-                        : at[d] == index.n[d] && !index.periodic[d] ? x(c, m)
-                                                                    : 0.5 * (x(c, m) + x(low, m));
+            centre[m] = at[d] == 0 && lattice.boundary_below[d]            ? x(low, m)
+                        : at[d] == index.n[d] && lattice.boundary_above[d] ? x(c, m)
+                                                                           : 0.5 * (x(c, m) + x(low, m));
           const Triple value = velocity(centre);
           flux(c) = 0;
           for (int m = 0; m < 3; ++m) flux(c) += area(c, m) * value[m];
@@ -95,24 +110,25 @@ Field make_field(const Grid& grid, const std::function<Triple(const Triple&)>& v
   return field;
 }
 
-/// Sum of (pressure across a face) times `value(face)` over the faces of the grid.
+/// Sum of (pressure across a face) times `value(face)` over the faces of the grid, on all ranks.
 double face_sum(const Transfer& transfer, const std::function<double(int, int)>& value) {
   const IndexSpace& index = transfer.block().index();
   double sum = 0;
   for (int d = 0; d < 3; ++d) {
     const auto across = on_host(transfer.faces().across[d]);
     CellBox box = face_box(index, d);
-    if (index.periodic[d]) --box.upper[d];
+    if (!transfer.block().lattice.boundary_above[d]) --box.upper[d];  // the next block's, or the first one's
     for (int k = box.lower[2]; k < box.upper[2]; ++k)
       for (int j = box.lower[1]; j < box.upper[1]; ++j)
         for (int i = box.lower[0]; i < box.upper[0]; ++i) sum += across(index.cell(i, j, k)) * value(d, index.cell(i, j, k));
   }
-  return sum;
+  return Comm().sum(sum);
 }
 
 double largest_error(const Components<double>& v, const Components<double>& x,
                      const std::function<Triple(const Triple&)>& velocity) {
-  const auto at = on_host(x), found = on_host(v);
+  const auto at = on_host(x);
+  const auto found = sum_of_ranks(v);
   double worst = 0;
   for (std::size_t i = 0; i < at.extent(0); ++i) {
     const Triple exact = velocity({at(i, 0), at(i, 1), at(i, 2)});
@@ -143,7 +159,7 @@ TEMPLATE_TEST_CASE("kernels add up to one and keep the position", "[transfer]", 
   }
 }
 
-TEST_CASE("what forces do to fluxes is what interpolated velocities say", "[transfer]") {
+TEST_CASE("what forces do to fluxes is what interpolated velocities say", "[transfer][ranks]") {
   // On a grid without two parallel faces, up to its walls. Round-off of sums of a few thousand terms of order one.
   const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
   const Comm comm;
@@ -152,15 +168,16 @@ TEST_CASE("what forces do to fluxes is what interpolated velocities say", "[tran
   const auto x = inside(count, 0.02, true);
   Transfer transfer(grid, sides(walls), kernel, count);
   REQUIRE(transfer.place(x) == -1);
-  CHECK(transfer.at_home() == count);
+  CHECK(comm.sum(static_cast<double>(transfer.at_home())) == count);
   Noise noise;
   const auto force = points(count, [&](int) { return Triple{noise(-1, 1), noise(-1, 1), noise(-1, 1)}; });
   transfer.spread(force);
-  Field field = make_field(grid, [&](const Triple&) { return Triple{noise(-1, 1), noise(-1, 1), noise(-1, 1)}; });
+  Field field = make_field(grid, rough);
   Kokkos::deep_copy(field.u, 0.0);  // walls at rest: theirs is no part of the transpose
   Components<double> v("corpuscle::test::v", count, 3);
   transfer.interpolate(field.flux, field.u, nullptr, v);
-  const auto f = on_host(force), u = on_host(v);
+  const auto f = on_host(force);
+  const auto u = sum_of_ranks(v);
   double at_vertices = 0;
   for (int i = 0; i < count; ++i)
     for (int m = 0; m < 3; ++m) at_vertices += f(i, m) * u(i, m);
@@ -171,7 +188,7 @@ TEST_CASE("what forces do to fluxes is what interpolated velocities say", "[tran
   CHECK(at_faces == Approx(at_vertices).epsilon(1e-12));
 }
 
-TEST_CASE("uniform velocities are exact on any grid and linear ones on straight grids, up to the walls", "[transfer]") {
+TEST_CASE("uniform velocities are exact on any grid and linear ones on straight grids, up to the walls", "[transfer][ranks]") {
   const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
   const Comm comm;
   const int count = 300;
@@ -188,13 +205,15 @@ TEST_CASE("uniform velocities are exact on any grid and linear ones on straight 
       straight(comm, sheared_box({9, 8, 10}), {false, false, false});
   const auto uniform = [](const Triple&) { return Triple{0.3, -1, 0.7}; };
   const auto linear = [](const Triple& p) { return Triple{0.3 + p[1] - 2 * p[2], p[0] - p[1], 0.2 + p[1] + p[2] - 3 * p[0]}; };
-  CHECK(error(warped, true, uniform) < 1e-12);
+  // The four-point kernel reaches one row further than halos do: there the faces' areas are extrapolated.
+  const bool extrapolated = kernel == Kernel::four_point && comm.size() > 1;
+  CHECK(error(warped, true, uniform) < (extrapolated ? 1e-3 : 1e-12));
   CHECK(error(straight, false, uniform) < 1e-12);
   CHECK(error(straight, false, linear) < 1e-11);
   CHECK(error(warped, true, linear) < 0.1);  // second order: 1 % of the largest velocity
 }
 
-TEST_CASE("forces arrive whole", "[transfer]") {
+TEST_CASE("forces arrive whole", "[transfer][ranks]") {
   // Away from walls, on the faces; and in the cells of a straight grid, with what they make of the faces' forces.
   const Comm comm;
   const bool straight = GENERATE(true, false);
@@ -223,12 +242,13 @@ TEST_CASE("forces arrive whole", "[transfer]") {
     CHECK(face_sum(transfer, [&](int d, int c) { return area[d](c, m); }) == Approx(total).epsilon(1e-12));
     double in_cells = 0;
     visit_owned(index, [&](int, int, int, int c) { in_cells -= volume(c) * density(c, m); });
+    in_cells = comm.sum(in_cells);
     if (!straight) UNSCOPED_INFO("on the curved grid cells receive " << in_cells / total);
     CHECK(in_cells == Approx(total).epsilon(straight ? 1e-12 : 0.02));
   }
 }
 
-TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]") {
+TEST_CASE("a marker astride a periodic side is one of many places", "[transfer][ranks]") {
   // Moved by a cell at a time around a periodic box, forces and velocities move with it.
   const Comm comm;
   Grid grid(comm, sheared_box({8, 6, 7}), {true, true, true});
@@ -242,32 +262,32 @@ TEST_CASE("a marker astride a periodic side is one of many places", "[transfer]"
   const int d = GENERATE(0, 1, 2);
   std::vector<double> first;
   Transfer transfer(grid, all, Kernel::three_point, copies);
-  for (int step = -2; step < index.n[d] + 2; ++step) {
+  const int planes = index.global[d];
+  for (int step = -2; step < planes + 2; ++step) {
     double s[3] = {0.61, 0.83, 0.37};
-    s[d] = 2 * (step + 0.13) / index.n[d];
+    s[d] = 2 * (step + 0.13) / planes;
     REQUIRE(transfer.place(points(copies, [&](int copy) {
       const Vec3& by = shifts[copy];
       return Triple{s[0] + 0.3 * s[1] + by.x, s[1] + 0.2 * s[2] + by.y, s[2] + 0.15 * s[0] + by.z};
     })) == -1);
-    CHECK(transfer.at_home() == 1);
+    CHECK(comm.sum(static_cast<double>(transfer.at_home())) == 1);
     transfer.spread(force);
     const auto across = on_host(transfer.faces().across[d]);
     std::vector<double> line;
-    for (int c = 0; c < index.n[d]; ++c) {
+    for (int c = 0; c < planes; ++c) {
       double sum = 0;
       visit_owned(index, [&](int i, int j, int k, int cell) {
-        const int at[3] = {i, j, k};
-        if (at[d] == ((c + step) % index.n[d] + index.n[d]) % index.n[d])
-          sum += across(cell) * (1 + at[(d + 1) % 3] + 10 * at[(d + 2) % 3]);
+        const int at[3] = {index.first[0] + i, index.first[1] + j, index.first[2] + k};
+        if (at[d] == (c + step + planes) % planes) sum += across(cell) * (1 + at[(d + 1) % 3] + 10 * at[(d + 2) % 3]);
       });
-      line.push_back(sum);
+      line.push_back(comm.sum(sum));
     }
     if (first.empty()) first = line;
-    for (int c = 0; c < index.n[d]; ++c) CHECK(line[c] == Approx(first[c]).margin(1e-10));
+    for (int c = 0; c < planes; ++c) CHECK(line[c] == Approx(first[c]).margin(1e-10));
     const auto uniform = make_field(grid, [](const Triple&) { return Triple{1, 2, 3}; });
     Components<double> v("corpuscle::test::v", copies, 3);
     transfer.interpolate(uniform.flux, uniform.u, nullptr, v);
-    const auto u = on_host(v);
+    const auto u = sum_of_ranks(v);
     for (int m = 0; m < 3; ++m) {
       double sum = 0;
       for (int copy = 0; copy < copies; ++copy) sum += u(copy, m);
@@ -298,10 +318,58 @@ TEST_CASE("spreading is the same bits again, and markers are sorted", "[transfer
   }
 }
 
-TEST_CASE("a vertex beyond a wall is named", "[transfer]") {
+TEST_CASE("how the grid is cut over ranks changes neither forces nor velocities", "[transfer][ranks]") {
+  // Vertices everywhere, those beside a plane between ranks with parts on both. Round-off of sums of some hundred terms. What
+  // the four-point kernel sees beyond the halo is exact where faces are alike.
+  const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
+  const Comm comm;
+  if (comm.size() == 1) return;
+  const int count = 600;
+  const bool curved = kernel == Kernel::three_point;
+  const auto x = inside(count, 0.02, curved);
+  Noise noise;
+  const auto force = points(count, [&](int) { return Triple{noise(-1, 1), noise(-1, 1), noise(-1, 1)}; });
+  const NodeSource nodes = curved ? warped_box({9, 8, 10}) : sheared_box({9, 8, 10});
+  Grid cut(comm, nodes, {false, false, false}), whole(Comm::alone(), nodes, {false, false, false});
+  Transfer of_ranks(cut, sides(walls), kernel, count), of_one(whole, sides(walls), kernel, count);
+  for (Transfer* transfer : {&of_ranks, &of_one}) {
+    REQUIRE(transfer->place(x) == -1);
+    transfer->spread(force);
+  }
+  CHECK(of_one.markers() == count);
+  CHECK(comm.sum(static_cast<double>(of_ranks.markers())) > 1.2 * count);  // many are on more than one rank
+  double largest = 0, off = 0;
+  const IndexSpace& index = cut.index();
+  for (int d = 0; d < 3; ++d) {
+    const auto mine = on_host(of_ranks.faces().across[d]), all = on_host(of_one.faces().across[d]);
+    const CellBox box = face_box(index, d);
+    for (int k = box.lower[2]; k < box.upper[2]; ++k)
+      for (int j = box.lower[1]; j < box.upper[1]; ++j)
+        for (int i = box.lower[0]; i < box.upper[0]; ++i) {
+          const double exact = all(whole.index().cell(index.first[0] + i, index.first[1] + j, index.first[2] + k));
+          largest = std::max(largest, std::abs(exact));
+          off = std::max(off, std::abs(mine(index.cell(i, j, k)) - exact));
+        }
+  }
+  CHECK(off < 1e-12 * largest);
+  const auto velocity = [&](Grid& grid, Transfer& transfer) {
+    const Field field = make_field(grid, rough);
+    Components<double> v("corpuscle::test::v", count, 3);
+    transfer.interpolate(field.flux, field.u, nullptr, v);
+    return v;
+  };
+  const auto u = sum_of_ranks(velocity(cut, of_ranks));
+  const auto exact = on_host(velocity(whole, of_one));
+  off = 0;
+  for (int i = 0; i < count; ++i)
+    for (int m = 0; m < 3; ++m) off = std::max(off, std::abs(u(i, m) - exact(i, m)));
+  CHECK(off < 1e-12);
+}
+
+TEST_CASE("a vertex beyond a wall is named", "[transfer][ranks]") {
   const Comm comm;
   Grid grid(comm, sheared_box({8, 8, 8}), {false, false, false});
   Transfer transfer(grid, sides(walls), Kernel::three_point, 3);
   const auto x = points(3, [](int i) { return i == 1 ? Triple{1.2, -0.1, 1} : Triple{1.2, 1, 1}; });
-  CHECK(transfer.place(x) == 1);
+  CHECK(comm.max(transfer.place(x)) == 1);  // on the rank whose wall it is
 }

@@ -15,11 +15,12 @@ namespace {
 constexpr int n = 4, high = 8;                       // cells along and across, of 1 um
 constexpr int along = 2 * n, count = along * along;  // markers
 
-/// A plate of markers between walls, `gap` from one of them, with its copies beyond the periodic sides.
+/// A plate of markers between walls, `gap` from one of them, with its copies beyond the periodic sides. On every rank by itself:
+/// the grid is too small to be cut.
 struct Plate {
   Plate(double gap, const Vec3& normal_of, const Vec3& force_per_area)
       : boundaries(sides({Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic})),
-        grid(Comm(), make_node_source(nodes()), {true, false, true}),
+        grid(Comm::alone(), make_node_source(nodes()), {true, false, true}),
         shifts(period_shifts(grid)),
         vertices(count * static_cast<int>(shifts.size())),
         transfer(grid, boundaries, CouplingSettings::Kernel::three_point, vertices) {
