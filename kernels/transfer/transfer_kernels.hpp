@@ -56,14 +56,9 @@ KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const do
   Vec3 seen[3];
   for (int d = 0; d < 3; ++d) {
     Vec3 sum;
-<<<<<<< HEAD
-    visit_faces<Delta>(block, eta, d,
-                       [&](int c, double w, const int(&)[3], const int(&)[3]) { sum += w * load(block.sharp_area[d], c); });
-=======
     visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&)[3]) {
       sum += w * (Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c));
     });
->>>>>>> owners
     seen[d] = sum;
   }
   return DualBasis(seen[0], seen[1], seen[2]);

@@ -195,16 +195,12 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double grid = 24 + 72 + 8 + 1;                                  // Grid: centres, faces, volumes, kinds
   const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
   const double krylov = 5 * 12;                                         // FluidSolver::Momentum
-<<<<<<< HEAD
-  const double search = surfaces ? 51 : 0;                              // ImmersedBoundary
-  const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
-  const double cytosol = ratios ? 8 + 3 * 4 : 0;                        // Cytosol
-=======
   // Transfer: of a kernel that is sharpened twice the faces once more, and other areas on grids that are not uniform.
   const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
   const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
   const double search = size.shared ? 29 + sharpening : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
->>>>>>> owners
+  const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
+  const double cytosol = ratios ? 2 * 8 + 3 * 4 : 0;                    // Cytosol
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;
