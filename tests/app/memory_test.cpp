@@ -83,9 +83,9 @@ TEST_CASE("memory of cells that ranks share out is announced within a quarter of
     bool contact;
   };
 #ifdef CORPUSCLE_MPI
-  const std::vector<Scene> scenes{{48, 1, false}, {48, 2, true}};
+  const std::vector<Scene> scenes{{32, 1, false}, {32, 2, true}};
 #else
-  const std::vector<Scene> scenes{{48, 1, false}};
+  const std::vector<Scene> scenes{{32, 1, false}};
 #endif
   for (const auto& s : scenes) {
     fs::remove_all(folder / "out");
