@@ -9,37 +9,45 @@
 
 namespace corpuscle {
 
-/// Whether the second difference along e is taken in this row of cells, or of faces across e: not on a side, where fluxes are given,
-/// nor in the cells beside it.
-KOKKOS_INLINE_FUNCTION bool sharpens(const Lattice& lattice, int e, bool faces, int row) {
-  const int last = lattice.index.n[e] - (faces ? 0 : 1);
-  return !(lattice.boundary_below[e] && row <= 0) && !(lattice.boundary_above[e] && row >= last);
+enum class Sharpen { areas, fluxes, forces };  // forces: with rows and columns of the other two exchanged
+
+/// The value beyond a side that a face beside it sees, which mirrors the face itself: its area; or its flux, which is then that of the
+/// velocity on the side twice less the face's own where the side gives the velocity. @param beyond  the node on the side
+KOKKOS_INLINE_FUNCTION double mirrored(const TransferBlock& block, Sharpen what, int d, int e, int end, int c, int beyond,
+                                       const Components<double>& u, double own) {
+  const double reflection = what == Sharpen::areas ? 1 : block.reflection[e][end][0];
+  if (what != Sharpen::fluxes || reflection > 0) return reflection * own;
+  return reflection * own + dot(load(block.area[d], c), load(u, beyond) + load(u, beyond - block.index().stride(d)));
 }
 
 /// sharp = raw less half of `moment`, in spacings squared, times the second differences, at the faces of direction d of this rank;
-/// raw's next to them must be valid. `transposed`: the same with rows and columns exchanged.
+/// raw's next to them must be valid. Fluxes through the sides themselves are given and stay.
+/// @param u  [cell, 3] um/us, read on the sides, of fluxes alone
 template <class Raw, class Sharp>
-void sharpen_faces(const Lattice& block_lattice, int d, double moment, bool transposed, const Raw& raw_faces, const Sharp& sharp_faces) {
-  const Lattice lattice = block_lattice;
-  const IndexSpace index = lattice.index;
+void sharpen_faces(const TransferBlock& transfer_block, Sharpen what, int d, double moment, const Components<double>& u,
+                   const Raw& raw_faces, const Sharp& sharp_faces) {
+  const TransferBlock block = transfer_block;
+  const IndexSpace index = block.index();
   const Raw raw = raw_faces;
   const Sharp sharp = sharp_faces;
   const double share = 0.5 * moment;
   const CellBox box = face_box(index, d);
   for_box(
       "corpuscle::transfer::sharpen", box.lower, box.upper, KOKKOS_LAMBDA(int i, int j, int k) {
-        const int c = index.cell(i, j, k), at[3] = {i, j, k};
-        double value = raw(c);
-        for (int e = 0; e < 3; ++e) {
-          const int s = index.stride(e);
-          const bool here = sharpens(lattice, e, e == d, at[e]);
-          const bool below = transposed ? sharpens(lattice, e, e == d, at[e] - 1) : here;
-          const bool above = transposed ? sharpens(lattice, e, e == d, at[e] + 1) : here;
-          if (here) value += 2 * share * raw(c);
-          if (below) value -= share * raw(c - s);
-          if (above) value -= share * raw(c + s);
+        const Lattice& lattice = block.lattice;
+        const int c = index.cell(i, j, k), at[3] = {i, j, k}, row = at[d], last = index.n[d], across = index.stride(d);
+        const auto between = [&](int r) { return !(lattice.boundary_below[d] && r <= 0) && !(lattice.boundary_above[d] && r >= last); };
+        const bool own = between(row), turned = what == Sharpen::forces;
+        double sum = own ? 2 * raw(c) : 0.0;
+        if (turned ? between(row - 1) : own) sum -= raw(c - across);
+        if (turned ? between(row + 1) : own) sum -= raw(c + across);
+        for (int n = 1; n < 3 && own; ++n) {
+          const int e = (d + n) % 3, s = index.stride(e);
+          const bool below = lattice.boundary_below[e] && at[e] == 0, above = lattice.boundary_above[e] && at[e] == index.n[e] - 1;
+          sum += 2 * raw(c) - (below ? mirrored(block, what, d, e, 0, c, c - s, u, raw(c)) : raw(c - s)) -
+                 (above ? mirrored(block, what, d, e, 1, c, c + s, u, raw(c)) : raw(c + s));
         }
-        sharp(c) = value;
+        sharp(c) = raw(c) + share * sum;
       });
 }
 

@@ -15,7 +15,7 @@ struct SlipLaw {
 };
 template <class Delta>
 constexpr SlipLaw slip_law() {
-  return Delta::points == 3 ? SlipLaw{0.085, 0.28} : SlipLaw{0.38, 0.22};
+  return Delta::points == 3 ? SlipLaw{0.104, 0.28} : SlipLaw{0.38, 0.22};
 }
 
 /// Velocity times viscosity for a tangential force per area f on a surface with that normal: symmetric in force and velocity.

@@ -144,7 +144,7 @@ void Transfer::prepare_sharpening() {
     sharp_flux_[d] = Array<double>("corpuscle::transfer::sharp_flux", index.size());
     sharp[d] = Components<double>("corpuscle::transfer::sharp_area", index.size(), 3);
     for (int m = 0; m < 3; ++m)
-      sharpen_faces(block_.lattice, d, moment_, false, Kokkos::subview(block_.area[d], Kokkos::ALL, m),
+      sharpen_faces(block_, Sharpen::areas, d, moment_, {}, Kokkos::subview(block_.area[d], Kokkos::ALL, m),
                     Kokkos::subview(sharp[d], Kokkos::ALL, m));
     grid_->halo().exchange(sharp[d]);
     most = std::max(most, largest_difference(index, d, block_.area[d], sharp[d]));
@@ -164,7 +164,7 @@ void Transfer::spread(const Components<double>& force) {
   for (int d = 0; d < 3; ++d) {
     grid_->halo().exchange(spread.across[d]);
     if (!sharp) continue;
-    sharpen_faces(block_.lattice, d, moment_, true, raw_[d], faces_.across[d]);
+    sharpen_faces(block_, Sharpen::forces, d, moment_, {}, raw_[d], faces_.across[d]);
     grid_->halo().exchange(faces_.across[d]);
   }
 }
@@ -176,7 +176,7 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
   for (int d = 0; d < 3 && sharp; ++d) {
     copy_faces(block_.index(), d, flux[d], raw_[d]);
     grid_->halo().exchange(raw_[d]);
-    sharpen_faces(block_.lattice, d, moment_, false, raw_[d], sharp_flux_[d]);
+    sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
   }
   with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity); });
   if (slip) add_slip(block_, *slip, markers_, velocity);

@@ -24,6 +24,7 @@ Errors two_layers(int n, double ratio, double offset, bool couette) {
   FluidSettings settings;
   settings.density_pg_per_um3 = settings.kinematic_viscosity_um2_per_us = 1;
   settings.convection = FluidSettings::Convection::none;
+  settings.momentum_tolerance = 1e-11;
   if (!couette) settings.pressure_gradient_Pa_per_um = {-1e3, 0, 0};  // 1 kPa/um
   const double h = 2.0 / n, face = 1 + offset * h;
   Grid grid(Comm(), make_node_source(box({4, n, 4}, {4 * h, 2, 4 * h})), {true, false, true});
