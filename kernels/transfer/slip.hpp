@@ -58,10 +58,10 @@ KOKKOS_INLINE_FUNCTION double slip_share(double spacings) {
 constexpr double slip_reach = 1.5;  // spacings
 
 /// How much is left beside a side that gives the velocity, of the slip along it. There the kernel is folded back, and a force
-/// along a plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side
-/// itself (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
+/// along a plate moves it too little by the same way as elsewhere down to a quarter of a spacing, and then by less: by nothing on the
+/// side itself (plane plates between such a side and a free one, three-point kernel: to within 0.05 of the spacing).
 KOKKOS_INLINE_FUNCTION double slip_share_along_side(double spacings) {
-  constexpr double whole = 0.6;
+  constexpr double whole = 0.25;
   if (spacings >= whole) return 1;
   const double left = spacings > 0 ? 1 - spacings / whole : 1;
   return 1 - left * left;

@@ -49,6 +49,7 @@ void MembraneViscosity::hold(const MembraneViews& m) {
   extend(given_, "given_vertex", m.vertices);
   extend(views_.right_side, "right_side_vertex", m.vertices);
   grow(views_.iterations, "iterations_cell", m.cells);
+  make_room(m);
 }
 
 Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)
@@ -107,8 +108,7 @@ void Membranes::make_room(const SurfaceSet& needed) {
 void Membranes::take_workspace() {
   if (!workspace_) return;
   const std::size_t triangles = views_.triangles, vertices = views_.vertices;
-  double* memory = workspace_->reserve(9 * triangles + 3 * vertices + (viscosity_ ? viscosity_->scratch(views_) : 0));
-  if (viscosity_) viscosity_->use_scratch(views_, memory + 9 * triangles + 3 * vertices);
+  double* memory = workspace_->reserve(9 * triangles + 3 * vertices);
   views_.corner_force = Table<double>(memory, triangles, 9);
   motion_.direction = Components<double>(memory + 9 * triangles, vertices, 3);
 }

@@ -9,20 +9,31 @@ namespace corpuscle {
 
 MembraneViscosity::MembraneViscosity(bool tangential) : tangential_(tangential) {}
 
+namespace {
+
+auto label(const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); }
+
+std::size_t scratch_numbers(const MembraneViews& m) {
+  return 9 * static_cast<std::size_t>(m.triangles) + 22 * static_cast<std::size_t>(m.vertices);
+}
+
+}  // namespace
+
 void MembraneViscosity::make_room(const MembraneViews& m) {
-  const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
-  scratch_ = Array<double>(label("viscous_scratch"), scratch(m));
-  use_scratch(m, scratch_.data());
+  const std::size_t numbers = scratch_numbers(m);
+  if (!scratch_.data() || scratch_.extent(0) < numbers) {
+    scratch_ = Array<double>();  // free before taking more
+    scratch_ = Array<double>(label("viscous_scratch"), numbers + (given_.data() ? numbers / 16 : 0));
+  }
+  divide_scratch(m);
+  if (given_.data()) return;
   views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
 }
 
-std::size_t MembraneViscosity::scratch(const MembraneViews& m) const {
-  return 9 * static_cast<std::size_t>(m.triangles) + 19 * static_cast<std::size_t>(m.vertices);
-}
-
-void MembraneViscosity::use_scratch(const MembraneViews& m, double* memory) {
+void MembraneViscosity::divide_scratch(const MembraneViews& m) {
   const std::size_t vertices = m.vertices, entries = 3 * static_cast<std::size_t>(m.triangles);
+  double* memory = scratch_.data();
   const auto take = [&](std::size_t numbers) {
     double* from = memory;
     memory += numbers;
@@ -31,10 +42,8 @@ void MembraneViscosity::use_scratch(const MembraneViews& m, double* memory) {
   views_.along = Table<double>(take(3 * entries), entries, 3);
   views_.diagonal = Array<double>(take(vertices), vertices);
   views_.block = Table<double>(take(6 * vertices), vertices, 6);
-  views_.gradient = Components<double>(take(3 * vertices), vertices, 3);
-  views_.residual = Components<double>(take(3 * vertices), vertices, 3);
-  views_.search = Components<double>(take(3 * vertices), vertices, 3);
-  views_.image = Components<double>(take(3 * vertices), vertices, 3);
+  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image, &direction_})
+    *vectors = Components<double>(take(3 * vertices), vertices, 3);
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -60,8 +69,11 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const MotionViews& m
   copy_vertices(m.vertices, force, given_);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& motion, double beta,
+void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& of_membranes, double beta,
                                const Components<double>& force) const {
+  MotionViews motion = of_membranes;
+  motion.direction = direction_;
+  Kokkos::deep_copy(Exec(), direction_, 0.0);  // so that a step depends on the state alone
   if (tangential_)
     resist_with<FullDamping>(m, motion, beta, force);
   else

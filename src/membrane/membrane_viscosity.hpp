@@ -9,12 +9,9 @@ namespace corpuscle {
 class MembraneViscosity {
  public:
   explicit MembraneViscosity(bool tangential);
-  /// Memory for these membranes; or, if they are those that a rank holds at present, which move with the fluid, only what lasts
-  /// longer than a call: then use_scratch() with as many numbers as scratch() before each.
+  /// Memory for these membranes; hold(): for those that a rank holds at present, which move with the fluid.
   void make_room(const MembraneViews& m);
   void hold(const MembraneViews& m);
-  std::size_t scratch(const MembraneViews& m) const;
-  void use_scratch(const MembraneViews& m, double* memory);
   /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step; zero before the first.
   const Components<double>& given() const { return given_; }
 
@@ -29,7 +26,7 @@ class MembraneViscosity {
 
   /// See Membranes::resist(): solves (beta A + D) v = beta A U + F - given + q dV/dx for m.surface.v, which holds U, with the
   /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then. The triangle geometry must be
-  /// current; motion.direction is where the solver of q starts from.
+  /// current.
   void resist(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
@@ -43,12 +40,14 @@ class MembraneViscosity {
   int iterations() const;
 
  private:
+  void divide_scratch(const MembraneViews& m);
   template <class Damping>
   void resist_with(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   bool tangential_;
   Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
-  Array<double> scratch_;     // only without
+  Array<double> scratch_;
+  Components<double> direction_;  // [vertex, 3] of the solver of q
   ViscosityViews views_;
 };
 

@@ -132,9 +132,7 @@ void Membranes::compute_forces() {
 
 void Membranes::resist(double beta, const Components<double>& force) {
   if (!viscosity_ || views_.cells == 0) return;
-  take_workspace();
   Kokkos::deep_copy(views_.status, 0);
-  Kokkos::deep_copy(motion_.direction, 0.0);  // so that a step depends on the state alone
   viscosity_->resist(views_, motion_, beta, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }

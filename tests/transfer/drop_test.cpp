@@ -95,7 +95,8 @@ TEST_CASE("drops in shear deform as Taylor says", "[transfer][drop]") {
   const double taylor = capillary * (19 * ratio + 16) / (16 * ratio + 16);
   if (std::getenv("CORPUSCLE_SHOW"))
     WARN(fmt::format("ratio {}: D {:.4f}, Taylor {:.4f}: {:+.1f} %", ratio, d, taylor, 100 * (d / taylor - 1)));
-  CHECK(d == Approx(taylor).epsilon(0.06));
+  // Four spacings a radius; a step of the viscosity is smeared over two.
+  CHECK(d == Approx(taylor).epsilon(ratio == 1 ? 0.03 : 0.08));
 }
 
 TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
