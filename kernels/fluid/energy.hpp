@@ -64,6 +64,26 @@ Sums<EnergyColumn::count> fluid_energy(const GridViews& grid, const ViscousCoeff
   return result;
 }
 
+/// What a viscosity that varies takes out of the flow beyond the uniform one, over that one's value, um3/us2: this rank's part.
+/// Faces between two nodes count half at each.
+inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& viscosity, const Array<NodeKind>& kind,
+                                 const Components<double>& u) {
+  const VaryingViscosity v = viscosity;
+  const IndexSpace index = grid.index;
+  return sum_owned("corpuscle::fluid::excess_dissipation", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    double sum = 0;
+    for (int d = 0; d < 3; ++d)
+      for (int end = 0; end < 2; ++end) {
+        const int s = index.stride(d), face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
+        if (kind(c) != NodeKind::fluid || (kind(beyond) != NodeKind::fluid && kind(beyond) != NodeKind::boundary)) continue;
+        const double r = face_viscosity(v, kind, c, beyond), share = kind(beyond) == NodeKind::boundary ? 1 : 0.5;
+        if (r != 1 || v.least != 1) sum += share * dot(excess_flux(v, r, u, index, d, face), load(u, face) - load(u, face - s));
+      }
+    return sum;
+  });
+}
+
 /// Power that enters through the boundary faces of one end (0 low, 1 high) of direction d, nW: pressure, viscous stress, and
 /// the kinetic energy that the flow carries, with `rho` zero where convection is left out. Second: the volume that flows
 /// in, um3/us. Pressure on a face without one of its own is extended from the two nodes beside it.

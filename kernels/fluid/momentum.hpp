@@ -48,10 +48,12 @@ void viscous_coefficients(const GridViews& grid, const ViscousCoefficients& g) {
   }
 }
 
-/// diagonal = mass V + mu (sum of the normal coefficients), on owned cells and one halo layer.
+/// diagonal = mass V + mu (sum of the normal coefficients, each times the relative viscosity), on owned cells and one halo layer.
 /// @param mass  density times the leading coefficient of the time derivative, pg/um3/us
-inline void momentum_diagonal(const GridViews& grid, const ViscousCoefficients& g, double mass, double mu,
-                              const Array<double>& diagonal) {
+template <class Viscosity>
+void momentum_diagonal(const GridViews& grid, const ViscousCoefficients& g, double mass, double mu, const Viscosity& viscosity,
+                       const Array<double>& diagonal) {
+  const Viscosity relative = viscosity;
   const IndexSpace index = grid.index;
   const auto volume = grid.volume;
   const auto g0 = g.normal[0], g1 = g.normal[1], g2 = g.normal[2];
@@ -59,7 +61,11 @@ inline void momentum_diagonal(const GridViews& grid, const ViscousCoefficients& 
   for_box("corpuscle::fluid::momentum_diagonal", {-1, -1, -1}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
           KOKKOS_LAMBDA(int i, int j, int k) {
             const int c = index.cell(i, j, k);
-            const double sum = g0(c) + g0(c + s0) + g1(c) + g1(c + s1) + g2(c) + g2(c + s2);
+            const auto of = [&](const Array<double>& g, int face, int beyond) {
+              return g(face) * mean_viscosity(relative, c, beyond);
+            };
+            const double sum = of(g0, c, c - s0) + of(g0, c + s0, c + s0) + of(g1, c, c - s1) + of(g1, c + s1, c + s1) +
+                               of(g2, c, c - s2) + of(g2, c + s2, c + s2);
             const double value = mass * volume(c) + mu * sum;
             diagonal(c) = value > 0 ? value : 1;
           });

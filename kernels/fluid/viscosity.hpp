@@ -9,51 +9,95 @@ namespace corpuscle {
 struct UniformViscosity {};
 
 /// `relative` [cell] is the viscosity at a node over that of the rest of the operator (FluidSolver::viscosity()), with valid
-/// halos; boundary nodes hold the value on the boundary.
+/// halos; boundary nodes hold the value on the boundary. `least` is not above any of them, nor above 1.
 struct VaryingViscosity {
   Array<double> relative;
+  double least;
+  Array<double> fluidity;  // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
   Components<double> x, face_area[3];  // as in GridViews
 };
 
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const UniformViscosity&, int) { return 1; }
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const VaryingViscosity& v, int c) { return v.relative(c); }
+/// On the face between two nodes.
+KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const UniformViscosity&, int, int) { return 1; }
+KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const VaryingViscosity& v, int a, int b) {
+  return 0.5 * (v.relative(a) + v.relative(b));
+}
 
-/// (grad u + grad u^T) . area on the face between c - stride(d) and c.
-template <class Velocity>
-KOKKOS_INLINE_FUNCTION Vec3 strain_rate_flux(const VaryingViscosity& v, const Velocity& u, const IndexSpace& index, int d,
-                                             int c) {
-  const int low = c - index.stride(d);
-  Vec3 a[3], du[3];
-  for (int e = 0; e < 3; ++e) {
-    const int s = index.stride(e);
-    if (e == d) {
-      a[e] = load(v.x, c) - load(v.x, low);
-      du[e] = to_double(load(u, c) - load(u, low));
-    } else {
-      a[e] = 0.5 * (central_offset(v.x, c, s) + central_offset(v.x, low, s));
-      du[e] = 0.25 * to_double(load(u, c + s) - load(u, c - s) + load(u, low + s) - load(u, low - s));
-    }
+/// Differences across a face and along it, of one value after the other.
+struct FaceDifferences {
+  DualBasis dual;
+  int d, low, c;
+
+  KOKKOS_INLINE_FUNCTION static Vec3 link(const Components<double>& x, const IndexSpace& index, int d, int c, int e) {
+    const int low = c - index.stride(d), s = index.stride(e);
+    return e == d ? load(x, c) - load(x, low) : 0.5 * (central_offset(x, c, s) + central_offset(x, low, s));
   }
-  const DualBasis dual(a[0], a[1], a[2]);
+  KOKKOS_INLINE_FUNCTION FaceDifferences(const Components<double>& x, const IndexSpace& index, int d, int c)
+      : dual(link(x, index, d, c, 0), link(x, index, d, c, 1), link(x, index, d, c, 2)), d(d), low(c - index.stride(d)), c(c) {}
+  /// Along direction e.
+  template <class Value>
+  KOKKOS_INLINE_FUNCTION auto of(const Value& value, const IndexSpace& index, int e) const {
+    const int s = index.stride(e);
+    return e == d ? value(c) - value(low) : 0.25 * (value(c + s) - value(c - s) + value(low + s) - value(low - s));
+  }
+};
+
+/// Where a face lies between two fluids they lie side by side, and share what stretches along their interface, but what shears
+/// across it one bears after the other: there the viscosity is the harmonic mean, less by `less` than the other one. Of flux, the part
+/// that this makes.
+KOKKOS_INLINE_FUNCTION Vec3 layered_flux(const VaryingViscosity& v, double less, const FaceDifferences& face, const Vec3 (&du)[3],
+                                         const IndexSpace& index, const Vec3& area) {
+  const auto relative = v.relative;
+  Vec3 normal;
+  for (int e = 0; e < 3; ++e) normal += face.of(relative, index, e) * face.dual.b[e];
+  const double square = dot(normal, normal);
+  if (!(square > 0)) return {};
+  normal *= 1 / std::sqrt(square);
+  Vec3 shear;
+  for (int e = 0; e < 3; ++e) shear += dot(face.dual.b[e], normal) * du[e] + dot(du[e], normal) * face.dual.b[e];
+  shear -= dot(shear, normal) * normal;
+  return -less * (dot(normal, area) * shear + dot(shear, area) * normal);
+}
+
+/// (r - 1) grad u . area + (r - least) grad u^T . area on the face between c - stride(d) and c, where r is the viscosity, and what two
+/// fluids beside each other make of it. A uniform part of the transpose's viscosity is the gradient of a divergence, which vanishes
+/// in the end. On the way there it is in the operator: with less than `least` taken off, velocities along their own gradient would be
+/// driven, not resisted, where r < 1/2.
+template <class Velocity>
+KOKKOS_INLINE_FUNCTION Vec3 excess_flux(const VaryingViscosity& v, double r, const Velocity& u, const IndexSpace& index, int d, int c) {
+  const FaceDifferences face(v.x, index, d, c);
   const Vec3 area = load(v.face_area[d], c);
-  Vec3 flux;
-  for (int e = 0; e < 3; ++e) flux += dot(area, dual.b[e]) * du[e] + dot(area, du[e]) * dual.b[e];
+  Vec3 du[3], flux;
+  for (int e = 0; e < 3; ++e) {
+    du[e] = face.of([&](int at) { return to_double(load(u, at)); }, index, e);
+    flux += ((r - 1) * dot(area, face.dual.b[e])) * du[e] + ((r - v.least) * dot(area, du[e])) * face.dual.b[e];
+  }
+  constexpr double round_off = 1e-12;
+  const bool between = v.fluidity.extent(0) > 0 && r == mean_viscosity(v, c, face.low);  // not on a boundary
+  const double less = between ? r - 2 / (v.fluidity(c) + v.fluidity(face.low)) : 0;
+  if (less > round_off * r) flux += layered_flux(v, less, face, du, index, area);
   return flux;
 }
 
-/// What a viscosity that varies adds to the viscous force on cell c, over the uniform one: div((r - 1) (grad u + grad u^T)).
-/// Where r = 1 the transpose is the gradient of a divergence that vanishes, and is left out there as in a uniform flow. r on
-/// a face is the mean of its two nodes', on the boundary that of the boundary.
+/// On the face towards `beyond`: the mean of its two nodes', on the boundary that of the boundary.
+KOKKOS_FORCEINLINE_FUNCTION double face_viscosity(const VaryingViscosity& v, const Array<NodeKind>& kind, int c, int beyond) {
+  return kind(beyond) == NodeKind::boundary ? v.relative(beyond) : mean_viscosity(v, c, beyond);
+}
+
+/// What a viscosity that varies adds to the viscous force on cell c, over the uniform one: div(r (grad u + grad u^T)) less
+/// div grad u. Where r = least = 1 that is nothing.
 template <class Velocity>
 KOKKOS_INLINE_FUNCTION Vec3 excess_force(const VaryingViscosity& v, const Velocity& u, const Array<NodeKind>& kind,
                                          const IndexSpace& index, int c) {
   Vec3 force;
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {
-      const int s = index.stride(d), face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
-      const double here = kind(beyond) == NodeKind::boundary ? v.relative(beyond) : 0.5 * (v.relative(c) + v.relative(beyond));
-      if (here == 1) continue;
-      force += (end == 0 ? 1 - here : here - 1) * strain_rate_flux(v, u, index, d, face);
+      const int s = index.stride(d), face = end == 0 ? c : c + s;
+      const double here = face_viscosity(v, kind, c, end == 0 ? c - s : c + s);
+      if (here == 1 && v.least == 1) continue;
+      force += (end == 0 ? -1.0 : 1.0) * excess_flux(v, here, u, index, d, face);
     }
   return force;
 }

@@ -68,6 +68,22 @@ KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const Table<double>&
   return sum;
 }
 
+/// The fluid around membranes that move with it: it moved with U under the force that it had last, and takes beta more for each
+/// area and each velocity beyond U. `force`: all others on the membrane.
+struct FluidReaction {
+  double beta;  // mPa s/um
+  Components<double> velocity, last_force, force;  // [vertex, 3] U, um/us; nN
+};
+
+/// What drives vertex i, from inside the membrane and outside, nN.
+template <class Load>
+KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const Load& outside, int i, double area) {
+  return gather_force(m, i) + outside.force(m, i, area);
+}
+KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReaction& fluid, int i, double area) {
+  return (fluid.beta * area) * load(fluid.velocity, i) + load(fluid.force, i) - load(fluid.last_force, i);
+}
+
 /// Right-hand side, diagonal, preconditioner and volume gradient at the current positions.
 template <class Damping, class Load>
 void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Load& outside, double dt) {
@@ -80,7 +96,7 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
         store(w.gradient, i, gather_area(m, i, area));
         const double diagonal = inertia + outside.beta * area;
         w.diagonal(i) = diagonal;
-        store(w.right_side, i, inertia * load(v, i) + gather_force(m, i) + outside.force(m, i, area));
+        store(w.right_side, i, inertia * load(v, i) + driving_force(m, outside, i, area));
         Symmetric3 b;
         const int first = m.surface.ring_start(i), last = m.surface.ring_start(i + 1);
         for (int r = first; r < last; ++r) {
@@ -208,6 +224,33 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
+/// v without any change of volume, after predict_viscous_velocity(). A fluid that cannot be compressed answers to a pressure inside
+/// with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
+inline void keep_volume(const MembraneViews& m, const MotionViews& motion) {
+  const auto v = m.surface.v;
+  for_sections(
+      "corpuscle::membrane::keep_volume", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const double factor = -section_total(motion.sums, cell, 0) / section_total(motion.sums, cell, 1);
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
+                             [&](int i) { store(v, i, load(v, i) + factor * load(motion.direction, i)); });
+      });
+}
+
+/// damping = D v, which is taken off m.force and, if it is another array, off `force`.
+template <class Damping>
+void subtract_damping(const MembraneViews& m, const Table<double>& along, const Components<double>& v,
+                      const Components<double>& force, const Components<double>& damping) {
+  const bool two = force.data() != m.force.data();
+  Kokkos::parallel_for(
+      "corpuscle::membrane::subtract_damping", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
+        const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
+        const Vec3 taken = damping_at<Damping>(m.surface, along, law, v, i);
+        store(damping, i, taken);
+        store(m.force, i, load(m.force, i) - taken);
+        if (two) store(force, i, load(force, i) - taken);
+      });
+}
+
 /// D v for given velocities, into `force` with its sign: the dissipative force on each vertex, nN.
 template <class Damping>
 void dissipative_force(const MembraneViews& m, const Components<double>& v, const Table<double>& along,
@@ -217,6 +260,16 @@ void dissipative_force(const MembraneViews& m, const Components<double>& v, cons
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
         store(force, i, -damping_at<Damping>(m.surface, along, law, v, i));
       });
+}
+
+/// Sum of damping . v, nW.
+inline double damping_power(const MembraneViews& m, const Components<double>& damping) {
+  const auto v = m.surface.v;
+  double power = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::damping_power", Policy(0, m.vertices),
+      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(load(damping, i), load(v, i)); }, power);
+  return power;
 }
 
 /// v . D v over all membranes, nW.

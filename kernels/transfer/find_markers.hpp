@@ -16,7 +16,7 @@ struct MarkerSearch {
 struct VertexPlaces {
   int vertices = 0;
   Table<double> xi;             // [vertex, 3] where it was last found in the lattice
-  Array<unsigned char> known;   // [vertex] 1 once it was
+  Array<unsigned char> known;   // [vertex] 1 if it was, at the last look
   Array<unsigned char> reach;   // [vertex] 1 if it reaches this rank's faces
   Array<int> beyond;            // [1] lowest vertex found beyond a side
 };
@@ -72,14 +72,15 @@ inline void find_vertices(const MarkerSearch& search, const Components<double>& 
   Kokkos::parallel_for(
       "corpuscle::transfer::find_vertices", Policy(0, places.vertices), KOKKOS_LAMBDA(int v) {
         const Vec3 p = load(x, v);
-        out.reach(v) = 0;
+        const bool guessed = out.known(v);
+        out.reach(v) = out.known(v) = 0;
         if (!within_bounds(s, p)) return;
         LatticePoint q;
-        if (out.known(v)) {
+        if (guessed) {
           const double xi[3] = {out.xi(v, 0), out.xi(v, 1), out.xi(v, 2)};
           s.lattice.set(q, xi);
         }
-        if (!locate_vertex(s.lattice, p, out.known(v), q)) return;
+        if (!locate_vertex(s.lattice, p, guessed, q)) return;
         double eta[3];
         lattice_to_index(s.lattice, q, eta);
         bool outside;

@@ -25,7 +25,7 @@ struct MarkerViews {
 /// The rank's block as markers see it.
 struct TransferBlock {
   Lattice lattice;
-  Components<double> area[3];
+  Components<double> area[3], sharp_area[3];  // of faces, and as sharpen_faces() makes them
   /// [direction][end][0: other velocities, 1: the normal one] by which a velocity is reflected beyond a side: -1 where the side
   /// gives it, +1 where it gives the derivative.
   double reflection[3][2][2];

@@ -7,15 +7,15 @@
 namespace corpuscle {
 
 /// A force along a plate, smeared over a width across it, moves the plate by c (width) f / mu less than a sharp one, f per
-/// area: with widths as wide as one spacing. The kernel's width across a surface is its spacing along the normal, h_n^2 = the
-/// sum of (n . g_d)^2 over the grid's directions g_d; from faces to cells and back a component along g_d is smeared along it
-/// once more, which adds (n . g_d)^2 times `mean`. Measured on plates at several angles, with spacings of up to 3 to 1.
+/// area. The kernel's width across a surface is its spacing along the normal, h_n^2 = the sum of (n . g_d)^2 over the grid's
+/// directions g_d; from faces to cells and back a component along g_d is smeared along it once more, which adds `oblique` times the
+/// square of (n . g_d)^2 / h_n^2 to `coefficient`. Measured on plates at several angles, with spacings of up to 3 to 1, to 0.01 h.
 struct SlipLaw {
-  double coefficient, mean;
+  double coefficient, oblique;
 };
 template <class Delta>
 constexpr SlipLaw slip_law() {
-  return Delta::points == 3 ? SlipLaw{0.268, 1.1} : SlipLaw{0.38, 0.6};
+  return Delta::points == 3 ? SlipLaw{0.104, 0.28} : SlipLaw{0.38, 0.22};
 }
 
 /// Velocity times viscosity for a tangential force per area f on a surface with that normal: symmetric in force and velocity.
@@ -26,14 +26,15 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_motion(const SlipLaw& law, const Vec3 (&along)[
     square[d] = dot(along[d], normal) * dot(along[d], normal);
     whole += square[d];
   }
+  for (int d = 0; d < 3; ++d) square[d] *= square[d] / (whole * whole);
   Vec3 motion;
   for (int d = 0; d < 3; ++d) {
     double sum = 0;
     for (int e = 0; e < 3; ++e) {
       const double tangential = dot(dual.b[d], dual.b[e]) - dot(dual.b[d], normal) * dot(dual.b[e], normal);
-      sum += std::sqrt(whole + 0.5 * law.mean * (square[d] + square[e])) * tangential * dot(along[e], f);
+      sum += (law.coefficient + 0.5 * law.oblique * (square[d] + square[e])) * tangential * dot(along[e], f);
     }
-    motion += (law.coefficient * sum) * along[d];
+    motion += (std::sqrt(whole) * sum) * along[d];
   }
   return motion;
 }
@@ -57,10 +58,10 @@ KOKKOS_INLINE_FUNCTION double slip_share(double spacings) {
 constexpr double slip_reach = 1.5;  // spacings
 
 /// How much is left beside a side that gives the velocity, of the slip along it. There the kernel is folded back, and a force
-/// along a plate moves it too little by the same way as elsewhere down to half a spacing, and then by less: by nothing on the side
-/// itself (plane plates between such a side and a free one, three-point kernel: to within 0.01 of the spacing).
+/// along a plate moves it too little by the same way as elsewhere down to a quarter of a spacing, and then by less: by nothing on the
+/// side itself (plane plates between such a side and a free one, three-point kernel: to within 0.05 of the spacing).
 KOKKOS_INLINE_FUNCTION double slip_share_along_side(double spacings) {
-  constexpr double whole = 0.6;
+  constexpr double whole = 0.25;
   if (spacings >= whole) return 1;
   const double left = spacings > 0 ? 1 - spacings / whole : 1;
   return 1 - left * left;

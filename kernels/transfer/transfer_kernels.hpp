@@ -24,7 +24,7 @@ KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double
       }
 }
 
-/// Area of the face `c` of direction d. Where a marker that reaches this block's first faces reaches a row beyond the halo on
+/// Area of the face `c` of direction d as the kernel sees it. Where a marker that reaches this block's first faces reaches a row beyond the halo on
 /// its other side, as the four-point kernel does, that is the line through the last two rows: exact where faces are alike.
 KOKKOS_INLINE_FUNCTION Vec3 seen_area(const TransferBlock& block, int d, int c, const int (&row)[3]) {
   constexpr int halo = IndexSpace::halo;
@@ -35,7 +35,7 @@ KOKKOS_INLINE_FUNCTION Vec3 seen_area(const TransferBlock& block, int d, int c, 
     inward[e] = row[e] < -halo ? 1 : (row[e] >= index.n[e] + halo ? -1 : 0);
     within = within && inward[e] == 0;
   }
-  if (within) return load(block.area[d], c);
+  if (within) return load(block.sharp_area[d], c);
   Vec3 sum;
   for (int corner = 0; corner < 8; ++corner) {
     double weight = 1;
@@ -45,7 +45,7 @@ KOKKOS_INLINE_FUNCTION Vec3 seen_area(const TransferBlock& block, int d, int c, 
       at[e] = row[e] + (1 + second) * inward[e];
       weight *= inward[e] == 0 ? 1 - second : (second ? -1 : 2);
     }
-    if (weight != 0) sum += weight * load(block.area[d], index.cell(at[0], at[1], at[2]));
+    if (weight != 0) sum += weight * load(block.sharp_area[d], index.cell(at[0], at[1], at[2]));
   }
   return sum;
 }
@@ -57,7 +57,7 @@ KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const do
   for (int d = 0; d < 3; ++d) {
     Vec3 sum;
     visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&)[3]) {
-      sum += w * (Delta::points > 3 ? seen_area(block, d, c, row) : load(block.area[d], c));
+      sum += w * (Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c));
     });
     seen[d] = sum;
   }
@@ -241,7 +241,7 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
               const bool beyond = end[0] >= 0 || end[1] >= 0 || end[2] >= 0;
               if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2]))
                 return;
-              sum += w * given_flux(block, u, d, row, end, load(block.area[d], c));
+              sum += w * given_flux(block, u, d, row, end, load(block.sharp_area[d], c));
             });
           part += sum * dual.b[d];
         }

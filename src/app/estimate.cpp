@@ -189,6 +189,8 @@ void require_below(double count, const char* what, const char* remedy, const cha
 double of_shared_cells(const Case& scene, const SceneSize& size) {
   // Of a vertex and its two triangles: surface, places and markers; of an own one, motion and the room of the forces' parts.
   double vertex = 310, own = 260;
+  const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
+  if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * (2 * 9 + 22 + 2 * 3);  // MembraneViscosity
   if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }
@@ -221,7 +223,12 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double grid = 24 + 72 + 8 + 1;                                  // Grid: centres, faces, volumes, kinds
   const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
   const double krylov = 5 * 12;                                         // FluidSolver::Momentum
-  const double search = size.shared ? 29 : (surfaces ? 51 : 0);         // Transfer; ImmersedBoundary
+  // Transfer: of a kernel that is sharpened twice the faces once more, and other areas on grids that are not uniform.
+  const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
+  const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
+  const double search = size.shared ? 29 + sharpening : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
+  const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
+  const double cytosol = ratios ? 2 * 8 + 3 * 4 : 0;                    // Cytosol
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;
@@ -231,7 +238,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   MemoryEstimate mb;
   mb.program = ranks > 1 ? 36 : 32;
   if (scene.grid) {
-    mb.fields = (nodes * (grid + solver + krylov + search + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
+    mb.fields = (nodes * (grid + solver + krylov + search + cytosol + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
     mb.multigrid = nodes * cycles * levels_over_finest(size) / bytes_per_mb;
     if (size.skewed) mb.pressure_matrix = owned * matrix / bytes_per_mb;
     // A vector of every node in the order of the file, on the device and on the host.

@@ -51,6 +51,8 @@ ModuleList list_modules(const Case& scene, int ranks) {
   const bool force = fluid && cells && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   add("immersed search", fluid && ((cells && !force) || bodies));
   add("transfer of forces", force);
+  add("viscosity ratio", std::any_of(scene.cells.begin(), scene.cells.end(),
+                                     [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
   add("contact", force && scene.contact);
   add("rigid bodies", bodies);
   add("packing", !scene.populations.empty());

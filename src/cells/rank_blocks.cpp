@@ -8,18 +8,25 @@
 
 namespace corpuscle {
 
-std::vector<Vec3> period_shifts(const Grid& grid) {
+std::vector<std::array<int, 3>> period_turns(const Grid& grid) {
   const IndexSpace& index = grid.index();
-  std::vector<Vec3> shifts;
+  std::vector<std::array<int, 3>> turns;
   for (int k = 0; k < 27; ++k) {
-    const int step[3] = {(k % 3 + 1) % 3 - 1, (k / 3 % 3 + 1) % 3 - 1, (k / 9 + 1) % 3 - 1};
-    Vec3 shift;
+    const std::array<int, 3> step{(k % 3 + 1) % 3 - 1, (k / 3 % 3 + 1) % 3 - 1, (k / 9 + 1) % 3 - 1};
     bool allowed = true;
-    for (int d = 0; d < 3; ++d) {
-      allowed = allowed && (step[d] == 0 || index.periodic[d]);
-      for (int m = 0; m < 3; ++m) shift[m] += step[d] * grid.period(d)[m];
-    }
-    if (allowed) shifts.push_back(shift);
+    for (int d = 0; d < 3; ++d) allowed = allowed && (step[d] == 0 || index.periodic[d]);
+    if (allowed) turns.push_back(step);
+  }
+  return turns;
+}
+
+std::vector<Vec3> period_shifts(const Grid& grid) {
+  std::vector<Vec3> shifts;
+  for (const auto& turns : period_turns(grid)) {
+    Vec3 shift;
+    for (int d = 0; d < 3; ++d)
+      for (int m = 0; m < 3; ++m) shift[m] += turns[d] * grid.period(d)[m];
+    shifts.push_back(shift);
   }
   return shifts;
 }

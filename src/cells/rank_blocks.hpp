@@ -1,6 +1,7 @@
 // Which rank a place belongs to, and which ranks' blocks a cell reaches into.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "grid/grid.hpp"
@@ -8,7 +9,9 @@
 
 namespace corpuscle {
 
-/// Shifts by whole periods under which cells are seen: the identity first, then all by one period or none along each direction.
+/// How many periods along each direction the shifts are under which cells are seen: the identity first, then all by one period or
+/// none along each direction. And the shifts themselves, um.
+std::vector<std::array<int, 3>> period_turns(const Grid& grid);
 std::vector<Vec3> period_shifts(const Grid& grid);
 
 struct SpaceBox {

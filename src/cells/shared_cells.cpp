@@ -37,6 +37,7 @@ SharedCells::SharedCells(const CellPlaces& places, const Grid& grid, int layers,
                          std::shared_ptr<Workspace> workspace)
     : comm_(grid.comm()),
       blocks_(grid, layers),
+      shift_turns_(period_turns(grid)),
       shifts_(period_shifts(grid)),
       frame_(periodic_frame(grid)),
       skin_(grid.mean_spacing()),
@@ -294,6 +295,18 @@ void SharedCells::renew_copies() {
   }
   membranes_->hold(held, static_cast<int>(own_.size()));
   messages_.set(comm_, sent, received);
+  note_turns(received);
+}
+
+void SharedCells::note_turns(const std::vector<CopyMessages::Copy>& received) {
+  const auto bodies = static_cast<std::size_t>(surfaces().bodies);
+  if (!turns_.data() || turns_.extent(0) < bodies)
+    turns_ = Table<int>(uninitialised("corpuscle::cells::turns"), bodies + bodies / 10 + 1, 3);
+  const auto turns = Kokkos::create_mirror_view(turns_);
+  Kokkos::deep_copy(turns, 0);
+  for (const CopyMessages::Copy& copy : received)
+    for (int d = 0; d < 3; ++d) turns(copy.cell, d) = shift_turns_[copy.image][d];
+  Kokkos::deep_copy(turns_, turns);
 }
 
 void SharedCells::to_copies(const Components<double>& field, bool positions) {

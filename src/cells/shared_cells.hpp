@@ -35,6 +35,8 @@ class SharedCells {
   Membranes& membranes() { return *membranes_; }
   const Membranes& membranes() const { return *membranes_; }
   const SurfaceSet& surfaces() const { return membranes_->surfaces(); }
+  /// [body, 3] periods along each direction by which a copy is shifted; 0 of own cells.
+  const Table<int>& turns() const { return turns_; }
   /// This rank's own, in the order of their numbers, as in membranes().
   const std::vector<CellRecord>& own() const { return own_; }
   /// Of the whole scene.
@@ -77,11 +79,13 @@ class SharedCells {
   void distribute(const std::vector<int>& owners);
   void set_own(const std::vector<double>& carried);
   void renew_copies();
+  void note_turns(const std::vector<CopyMessages::Copy>& received);
   std::vector<SpaceBox> find_reach() const;
   std::vector<int> owners() const;
 
   Comm comm_;
   RankBlocks blocks_;
+  std::vector<std::array<int, 3>> shift_turns_;
   std::vector<Vec3> shifts_;
   PeriodicFrame frame_;
   double skin_, contact_;  // um
@@ -90,6 +94,7 @@ class SharedCells {
   CopyMessages messages_;
   Table<double> boxes_, before_;  // [cell, BoxColumn::count] now, and when copies were made
   HostMirror<Table<double>> boxes_host_;
+  Table<int> turns_;
   int total_ = 0;
   std::int64_t total_vertices_ = 0, total_triangles_ = 0;
   long steps_ = 0, moves_ = 0, renewals_ = 0;

@@ -28,6 +28,15 @@ Case without_cells(const Case& scene) {
   return rest;
 }
 
+/// Along index direction d: the grid's volume over the area that it is swept with.
+double mean_spacing(const Grid& grid, int d) {
+  const IndexSpace index = grid.index();
+  const Components<double> area = grid.views().face_area[d];
+  const double swept = sum_owned("corpuscle::coupling::swept_area", index,
+                                 KOKKOS_LAMBDA(int i, int j, int k) { return norm(load(area, index.cell(i, j, k))); });
+  return grid.total_volume() / grid.comm().sum(swept);
+}
+
 /// Within which cells act on each other, um.
 double contact_reach(const Case& scene) {
   if (!scene.contact) return 0;
@@ -49,6 +58,12 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
                                          workspace_);
   if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
   fluid.set_face_force(transfer_->faces());
+  std::vector<double> ratios;
+  for (const CellReference& type : membranes_->types()) ratios.push_back(type.viscosity_ratio);
+  if (std::any_of(ratios.begin(), ratios.end(), [](double ratio) { return ratio != 1; })) {
+    cytosol_ = std::make_unique<Cytosol>(fluid.grid(), ratios);
+    fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least(), cytosol_->fluidity());
+  }
   fluid.raise_reference_speed(quiet_speed_);
   take_up();
 }
@@ -97,6 +112,18 @@ void ForceCoupling::watch_outflow() {
   if (outflow_.distance > least) outflow_ = {least, -1};
 }
 
+/// The viscosity, with the membranes where place() found them.
+/// @throws ComputationError  if there is no saying what is inside them
+void ForceCoupling::fill_cells(double time) {
+  if (!cytosol_) return;
+  cytosol_->update(*transfer_, surfaces(), {membranes_->views().type, cells_->turns()});
+  if (cytosol_->broken())
+    throw ComputationError(
+        fmt::format("what is inside the cells cannot be told at {:.6g} us: a triangle of a membrane reaches over more than two "
+                    "spacings of the grid. Use more vertices (cells.vertices) or a coarser grid (grid.nodes)",
+                    time));
+}
+
 void ForceCoupling::check_start() {
   const Comm& comm = fluid_.grid().comm();
   if (grows_) inflate();
@@ -116,6 +143,7 @@ void ForceCoupling::check_start() {
   coarse_ = agree(comm, coarse_);
   try {
     place(0);
+    fill_cells(0);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
@@ -133,6 +161,7 @@ void ForceCoupling::check_start() {
   }
   if (packing_ && !small_) check_packing();
   measure_stability();
+  find_softest();
   if (loads_) loads_->look_at_start(lengths_us_.front());
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (small_) return membranes_->rest_at_size(1);
@@ -153,6 +182,14 @@ bool ForceCoupling::second_order(double dt) const {
   return dt <= margin * stable_us_;
 }
 
+/// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the
+/// outer one, which is all that resists the slip.
+double ForceCoupling::resisting_share() const {
+  double share = 1;
+  for (const CellReference& type : membranes_->types()) share = std::min(share, 0.5 * (1 + type.viscosity_ratio));
+  return share;
+}
+
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
 /// kernel, and the slip, which has no interaction and is largest for the finest modes. A tenth less, since a load stiffens the
@@ -160,11 +197,10 @@ bool ForceCoupling::second_order(double dt) const {
 void ForceCoupling::measure_stability() {
   constexpr double limit = 1.8;
   const double spacing = fluid_.grid().mean_spacing();
-  const bool three = scene_.coupling->kernel == CouplingSettings::Kernel::three_point;
   update_surface_geometry(surfaces());
   MobilityModel model;
-  model.viscosity = fluid_.viscosity();
-  model.radius = (three ? 0.91 : 1.25) * spacing;  // of a marker alone: Delong et al., J. Chem. Phys. 140, 2014
+  model.viscosity = fluid_.viscosity() * resisting_share();
+  model.radius = transfer_->marker_radius() * spacing;
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
   const double fastest =
       std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
@@ -202,6 +238,39 @@ std::string ForceCoupling::nearest_outflow() const {
   return agree(fluid_.grid().comm(), text);
 }
 
+/// How the fluid's force on membranes changes with their velocity, per area, where it does so least: the largest deformation of
+/// one cell alone (a quadrupole of its size), or of all cells together, as the longest shear wave that the grid has room for.
+double ForceCoupling::anticipated_reaction(double dt) const {
+  const Softest& s = softest_;
+  if (s.area == 0) return 0;
+  const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;
+  const double depth = fluid_.grid().total_volume() / s.area;
+  return std::min(3 * mu / s.radius, depth * (mu * s.wave_number_square + rho / dt));
+}
+
+void ForceCoupling::find_softest() {
+  if (!membranes_->viscosity()) return;
+  const double pi = std::acos(-1.0);
+  const Grid& grid = fluid_.grid();
+  double largest = 0;
+  for (const auto& cell : membranes_->diagnostics()) {
+    softest_.area += cell.area_um2;
+    largest = std::max(largest, cell.area_um2);
+  }
+  softest_.area = grid.comm().sum(softest_.area);
+  softest_.radius = std::sqrt(grid.comm().max(largest) / (4 * pi));
+  double longest = 0, square = 0;
+  for (int d = 0; d < 3; ++d) {
+    const double length = grid.index().global[d] * mean_spacing(grid, d);
+    longest = std::max(longest, length);
+    const auto held = [&](const BoundarySettings& b) {
+      return static_cast<int>(b.side) / 2 == d && (b.type == BoundarySettings::Type::wall || b.type == BoundarySettings::Type::moving_wall);
+    };
+    if (std::count_if(scene_.boundaries.begin(), scene_.boundaries.end(), held) == 2) square += std::pow(pi / length, 2);
+  }
+  softest_.wave_number_square = square > 0 ? square : std::pow(2 * pi / longest, 2);
+}
+
 StepStatistics ForceCoupling::advance(double time, double dt) {
   const double ahead = second_order(dt) ? dt : 0;
   {
@@ -216,9 +285,14 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   {
     const auto scope = timers_.scope("transfer");
     place(time);
+    fill_cells(time);
     if (loads_) {
       const auto contact = timers_.scope("contact");
       loads_->gather(dt, second_order(dt));
+    }
+    {
+      const auto membrane = timers_.scope("membrane");
+      together([&] { membranes_->resist(anticipated_reaction(dt), forces()); });
     }
     cells_->to_copies(forces());
     transfer_->spread(forces());

@@ -2,11 +2,12 @@
 #pragma once
 
 #include "cells/shared_cells.hpp"
-#include "coupling/cell_loads.hpp"
 #include "core/error.hpp"
+#include "coupling/cell_loads.hpp"
 #include "coupling/coupling.hpp"
 #include "parallel/agree.hpp"
 #include "populations/populations.hpp"
+#include "transfer/cytosol.hpp"
 #include "transfer/near_side.hpp"
 #include "transfer/transfer.hpp"
 
@@ -56,6 +57,7 @@ class ForceCoupling : public Coupling {
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);
+  void fill_cells(double time_us);
   void take_up();
   void watch_outflow();
   /// What fails on one rank fails on all.
@@ -72,6 +74,9 @@ class ForceCoupling : public Coupling {
   }
   bool second_order(double dt) const;
   double two_steps_um(double dt) const;
+  double resisting_share() const;
+  void find_softest();
+  double anticipated_reaction(double dt) const;
   /// The sum of all forces at the last gathering of loads.
   const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;
@@ -95,9 +100,14 @@ class ForceCoupling : public Coupling {
   Membranes* membranes_;                        // theirs
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
+  std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely
+  /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.
+  struct Softest {
+    double area = 0, radius = 0, wave_number_square = 0;
+  } softest_;
   double stable_us_ = 0;      // largest stable step at the start
   double outflow_limit_ = 0;  // um
   NearSide outflow_;          // at the last place()

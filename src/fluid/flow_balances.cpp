@@ -19,6 +19,9 @@ FluidEnergy flow_energy(FluidSolver& fluid, double body_volume) {
   constexpr int columns = EnergyColumn::count;
   double sums[columns + 2];
   std::copy_n(own.value, columns, sums);
+  fluid.visit_varying_viscosity([&](const VaryingViscosity& viscosity) {
+    sums[EnergyColumn::gradient_square] += excess_dissipation(views, viscosity, fluid.kind(), u);
+  });
   sums[columns] = sums[columns + 1] = 0;
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {

@@ -136,6 +136,10 @@ void FluidSolver::complete_velocity(const EmbeddedBodies* bodies) {
   exchange_immersed(u_);
 }
 
+void FluidSolver::update_diagonal() {
+  with_viscosity([&](const auto& viscosity) { momentum_diagonal(grid_->views(), g_, mass_, mu_, viscosity, diagonal_); });
+}
+
 void FluidSolver::begin_step(double dt) {
   const auto scope = timers_->scope("momentum");
   const double rho = settings_.density_pg_per_um3;
@@ -149,7 +153,7 @@ void FluidSolver::begin_step(double dt) {
   mass_ = rho * (1 + 2 * ratio_) / ((1 + ratio_) * dt);
   mass1_ = rho * (1 + ratio_) / dt;
   mass2_ = -rho * ratio_ * ratio_ / ((1 + ratio_) * dt);
-  momentum_diagonal(grid_->views(), g_, mass_, mu_, diagonal_);
+  if (!relative_viscosity_.data()) update_diagonal();
   if (mass_ != momentum_->mass) momentum_->mass = mass_, momentum_->stale = true;
   // First guess: extrapolated in time (u_ still holds the oldest level and is overwritten).
   if (second_order)
@@ -322,6 +326,7 @@ void FluidSolver::solve_and_project(const EmbeddedBodies* bodies, double residua
 }
 
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
+  if (relative_viscosity_.data()) update_diagonal();  // with what it is now
   update_momentum_cycle();
   assemble_history(time);
   complete_velocity(bodies);

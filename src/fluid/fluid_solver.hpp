@@ -78,7 +78,23 @@ class FluidSolver {
 
   /// A viscosity that varies in space: `relative` [cell] is its ratio to viscosity(), with valid halos and, at boundary nodes,
   /// the boundary's. Shared: what is written into it counts from the next solve. Without this call there is one viscosity.
-  void set_viscosity(const Array<double>& relative) { relative_viscosity_ = relative; }
+  /// @param least     not above any value that it will have, nor above 1
+  /// @param fluidity  [cell] where cells hold two fluids, the mean of the inverse of what `relative` is the mean of; shared
+  void set_viscosity(const Array<double>& relative, double least = 1, const Array<double>& fluidity = {}) {
+    fluidity_ = fluidity;
+    relative_viscosity_ = relative;
+    least_viscosity_ = least;
+  }
+  /// Without values where there is one viscosity.
+  const Array<double>& relative_viscosity() const { return relative_viscosity_; }
+  /// Calls `use` with the viscosity if it varies.
+  template <class Use>
+  void visit_varying_viscosity(const Use& use) const {
+    const GridViews& grid = grid_->views();
+    if (relative_viscosity_.data())
+      use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, grid.x,
+                           {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
+  }
 
   /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
   /// solve, to set it and the given boundary velocities. For manufactured solutions and user forces.
@@ -104,6 +120,7 @@ class FluidSolver {
 
  private:
   void update_pressure_equation();
+  void update_diagonal();
   void fill_halos(const Components<double>& u);
   void assemble_history(double time_us);
   double momentum_residual();
@@ -123,8 +140,7 @@ class FluidSolver {
   template <class Use>
   void with_viscosity(const Use& use) const {
     if (!relative_viscosity_.data()) return use(UniformViscosity());
-    const GridViews& grid = grid_->views();
-    use(VaryingViscosity{relative_viscosity_, grid.x, {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
+    visit_varying_viscosity(use);
   }
   template <class Use>
   void with_face_force(const Use& use) const {
@@ -160,6 +176,8 @@ class FluidSolver {
   Array<NodeKind> kind_;
   PressureMask mask_;
   Array<double> relative_viscosity_;  // empty: one viscosity
+  Array<double> fluidity_;            // empty: no cell holds two fluids
+  double least_viscosity_ = 1;
   ViscousCoefficients g_;
   double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()
   std::unique_ptr<PressureAcceleration> acceleration_;  // once a step has needed it

@@ -97,6 +97,7 @@ struct CellSettings {
   Triple center_um{};                   // of the cell's volume
   Triple axis{0, 0, 1};                 // direction of the cell's symmetry axis
   double spin_deg = 0;                  // rotation of the mesh about that axis
+  Triple start_stretch{1, 1, 1};        // by which the cell starts drawn out along its own axes, with its volume kept
   Triple push_nN{};                     // on the cell from outside, the same share on each vertex
   double mass_pg = 100;
   Law law = Law::wlc_pow;
@@ -105,6 +106,7 @@ struct CellSettings {
   double reference_reduced_volume = 0.95;  // spheroid: 6 sqrt(pi) V / A^(3/2) of the shape that the sheet rests on
   double inflation = 0;                 // sphere: radius over that at which the sheet rests, less 1
   Interior interior = Interior::empty;
+  double viscosity_ratio = 1;           // of the fluid inside over that outside; 1 unless membranes are forces
   double shear_modulus_uN_per_m = 6.32; // at small strains, of any law
   double bending_modulus_fJ = 2.4e-4;   // kappa; k_b = 2 kappa / sqrt(3)
   double area_modulus_uN_per_m = 236;   // k_a; for sheets (neo_hookean, skalak) a case's default is 0 for both

@@ -53,7 +53,7 @@ bool is_geometry(const std::string& key) {
   if (starts_with(key, "boundary.")) return ends_with(key, ".side") || ends_with(key, ".type");
   if (!starts_with(key, "cells.") && !starts_with(key, "cell_types.")) return false;
   for (const char* name : {".type", ".vertices", ".shape", ".diameter_um", ".radius_um", ".semi_axes_um", ".mesh", ".interior",
-                           ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg"})
+                           ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg", ".start_stretch"})
     if (ends_with(key, name)) return true;
   return false;
 }

@@ -39,15 +39,22 @@ void check_tube_sides(const Case& scene, const Complaint& complain) {
   }
 }
 
+std::string constants_entry(const Case& scene, std::size_t c) {
+  return scene.cells[c].type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", scene.cells[c].type);
+}
+
+void check_sharp_scheme(const Case& scene, const Complaint& complain) {
+  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+    if (scene.cells[c].viscosity_ratio != 1)
+      complain(constants_entry(scene, c), "viscosity_ratio",
+               "needs coupling.scheme = \"force\": with the others cells have no fluid inside. Leave it out, or set that scheme");
+}
+
 /// What membranes that are forces do not have yet.
 void check_force_scheme(const Case& scene, const Complaint& complain) {
   if (!scene.bodies.empty())
     complain("bodies", "",
              "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
-  for (std::size_t c = 0; c < scene.cells.size(); ++c)
-    if (scene.cells[c].membrane_viscosity_N_s_per_m > 0)
-      complain(scene.cells[c].type < 0 ? fmt::format("cells.{}", c) : fmt::format("cell_types.{}", scene.cells[c].type),
-               "membrane_viscosity_N_s_per_m", "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
 }
 
 /// Cells that the program places.
@@ -167,7 +174,10 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (!scene.grid) complain("fluid", "", "a fluid needs a [grid]");
   if (scene.coupling && !scene.has_cells())
     complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
-  if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) check_force_scheme(scene, complain);
+  if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force)
+    check_force_scheme(scene, complain);
+  else
+    check_sharp_scheme(scene, complain);
   if (scene.contact && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
     complain("contact", "",
              !scene.has_cells() ? "there are no [[cells]] to touch each other: leave this section out"

@@ -119,7 +119,7 @@ class CaseReader {
   /// this coupling.
   void note_without_effect(Case& scene) const {
     for (const auto& [key, why] : {std::pair{"mass_pg", "membranes have no mass of their own"},
-                                   {"interior", "the fluid is inside the cells as well, as viscous as outside"}}) {
+                                   {"interior", "the fluid is inside the cells as well (viscosity_ratio)"}}) {
       std::string first;
       int others = -1;
       for (const char* list : {"cell_types", "cells"}) {

@@ -119,6 +119,12 @@ void read_membrane(Section& s, CellSettings& c) {
       s.choice<Dissipation>("dissipation", {{"central", Dissipation::central}, {"full", Dissipation::full}}, c.dissipation);
 }
 
+Bounds viscosity_ratios() {
+  Bounds bounds = between(0.1, 50);
+  bounds.text += ", of the viscosity inside over that outside: a grid cannot show a sharper step from one to the other";
+  return bounds;
+}
+
 /// What the cells of a type have in common.
 void read_constants(Section& s, CellSettings& c) {
   using Interior = CellSettings::Interior;
@@ -133,6 +139,7 @@ void read_constants(Section& s, CellSettings& c) {
   c.interior = s.choice<Interior>("interior", {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
   if (c.interior == Interior::cytosol)
     s.fail("interior", "a fluid inside the cell does not exist yet; use \"empty\" (the volume is held exactly)");
+  c.viscosity_ratio = s.number("viscosity_ratio", viscosity_ratios(), c.viscosity_ratio);
   read_membrane(s, c);
 }
 
@@ -141,6 +148,7 @@ void read_place(Section& s, CellSettings& c, bool placed) {
   c.center_um = placed ? s.triple("center_um", anywhere) : s.triple("center_um", anywhere, Triple{});
   c.axis = read_axis(s);
   c.spin_deg = s.number("spin_deg", between(-360, 360), c.spin_deg);
+  c.start_stretch = s.triple("start_stretch", between(0.5, 2), c.start_stretch);
   c.push_nN = s.triple("push_nN", between(-most_nN, most_nN), Triple{});
 }
 
@@ -189,7 +197,7 @@ CellTypeSettings read_cell_type(Section& s, const std::vector<CellTypeSettings>&
   if (s.has("name") && type.name.empty()) s.fail("name", "must not be empty: cells say type = \"name\"");
   for (const auto& other : known)
     if (other.name == type.name) s.fail("name", fmt::format("cell_types.{} has this name already", other.cell.type));
-  for (const char* key : {"center_um", "axis", "spin_deg", "push_nN"})
+  for (const char* key : {"center_um", "axis", "spin_deg", "start_stretch", "push_nN"})
     s.unused(key, "a type has no place: give it in the [[cells]] entry of each cell");
   type.cell.type = static_cast<int>(known.size());
   read_constants(s, type.cell);

@@ -45,12 +45,20 @@ void fill(const Array<int>& view, const std::vector<int>& values) {
 
 }  // namespace
 
+void MembraneViscosity::hold(const MembraneViews& m) {
+  extend(given_, "given_vertex", m.vertices);
+  extend(views_.right_side, "right_side_vertex", m.vertices);
+  grow(views_.iterations, "iterations_cell", m.cells);
+  make_room(m);
+}
+
 Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)
     : types_(types), workspace_(std::move(workspace)) {
   std::vector<TriangleMesh> meshes;
   for (const CellReference& type : types_) meshes.push_back(type.mesh);
   templates_ = make_surface_set(meshes);
   views_ = make_membrane_views(make_surface_set({}), types_, {});
+  make_viscosity();
   status_host_ = HostCopy(views_.status);
   hold({}, 0);
 }
@@ -136,6 +144,7 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   fill(set.number, number);
   fill(views_.type, type);
   if (set.bodies > 0) fill_topology(templates_, views_.type, set);
+  if (viscosity_) viscosity_->hold(views_);
   describe_cells(cells, own);
   stiffness_.clear();
   elasticity_ = make_elasticity(types_, type_of_own);

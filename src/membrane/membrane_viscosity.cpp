@@ -3,20 +3,47 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "membrane/interface.hpp"
+
 namespace corpuscle {
 
-MembraneViscosity::MembraneViscosity(const MembraneViews& m, bool tangential) : tangential_(tangential) {
-  const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
-  const int entries = 3 * m.triangles;
-  views_.along = Table<double>(label("along_ring"), entries, 3);
-  views_.diagonal = Array<double>(label("diagonal_vertex"), m.vertices);
-  views_.block = Table<double>(label("block_vertex"), m.vertices, 6);
+MembraneViscosity::MembraneViscosity(bool tangential) : tangential_(tangential) {}
+
+namespace {
+
+auto label(const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); }
+
+std::size_t scratch_numbers(const MembraneViews& m) {
+  return 9 * static_cast<std::size_t>(m.triangles) + 22 * static_cast<std::size_t>(m.vertices);
+}
+
+}  // namespace
+
+void MembraneViscosity::make_room(const MembraneViews& m) {
+  const std::size_t numbers = scratch_numbers(m);
+  if (!scratch_.data() || scratch_.extent(0) < numbers) {
+    scratch_ = Array<double>();  // free before taking more
+    scratch_ = Array<double>(label("viscous_scratch"), numbers + (given_.data() ? numbers / 16 : 0));
+  }
+  divide_scratch(m);
+  if (given_.data()) return;
   views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
-  views_.gradient = Components<double>(label("gradient_vertex"), m.vertices, 3);
-  views_.residual = Components<double>(label("residual_vertex"), m.vertices, 3);
-  views_.search = Components<double>(label("search_vertex"), m.vertices, 3);
-  views_.image = Components<double>(label("image_vertex"), m.vertices, 3);
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
+}
+
+void MembraneViscosity::divide_scratch(const MembraneViews& m) {
+  const std::size_t vertices = m.vertices, entries = 3 * static_cast<std::size_t>(m.triangles);
+  double* memory = scratch_.data();
+  const auto take = [&](std::size_t numbers) {
+    double* from = memory;
+    memory += numbers;
+    return from;
+  };
+  views_.along = Table<double>(take(3 * entries), entries, 3);
+  views_.diagonal = Array<double>(take(vertices), vertices);
+  views_.block = Table<double>(take(6 * vertices), vertices, 6);
+  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image, &direction_})
+    *vectors = Components<double>(take(3 * vertices), vertices, 3);
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -32,7 +59,29 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   }
 }
 
+template <class Damping>
+void MembraneViscosity::resist_with(const MembraneViews& m, const MotionViews& motion, double beta,
+                                    const Components<double>& force) const {
+  constexpr double massless = 1e300;  // us: mass over it
+  predict_viscous_velocity<Damping>(m, motion, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
+  keep_volume(m, motion);
+  subtract_damping<Damping>(m, views_.along, m.surface.v, force, views_.right_side);
+  copy_vertices(m.vertices, force, given_);
+}
+
+void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& of_membranes, double beta,
+                               const Components<double>& force) const {
+  MotionViews motion = of_membranes;
+  motion.direction = direction_;
+  Kokkos::deep_copy(Exec(), direction_, 0.0);  // so that a step depends on the state alone
+  if (tangential_)
+    resist_with<FullDamping>(m, motion, beta, force);
+  else
+    resist_with<CentralDamping>(m, motion, beta, force);
+}
+
 double MembraneViscosity::dissipation(const MembraneViews& m) const {
+  if (given_.data()) return damping_power(m, views_.right_side);  // they move as the fluid does, not quite as D was told
   return tangential_ ? viscous_power<FullDamping>(m) : viscous_power<CentralDamping>(m);
 }
 

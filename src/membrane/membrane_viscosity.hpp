@@ -8,7 +8,12 @@ namespace corpuscle {
 
 class MembraneViscosity {
  public:
-  MembraneViscosity(const MembraneViews& membranes, bool tangential);
+  explicit MembraneViscosity(bool tangential);
+  /// Memory for these membranes; hold(): for those that a rank holds at present, which move with the fluid.
+  void make_room(const MembraneViews& m);
+  void hold(const MembraneViews& m);
+  /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step; zero before the first.
+  const Components<double>& given() const { return given_; }
 
   template <class Load>
   void predict_velocity(const MembraneViews& m, const MotionViews& motion, const Load& load, double dt) const {
@@ -18,6 +23,11 @@ class MembraneViscosity {
       predict_viscous_velocity<CentralDamping>(m, motion, views_, load, dt);
     }
   }
+
+  /// See Membranes::resist(): solves (beta A + D) v = beta A U + F - given + q dV/dx for m.surface.v, which holds U, with the
+  /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then. The triangle geometry must be
+  /// current.
+  void resist(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -30,7 +40,14 @@ class MembraneViscosity {
   int iterations() const;
 
  private:
+  void divide_scratch(const MembraneViews& m);
+  template <class Damping>
+  void resist_with(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
+
   bool tangential_;
+  Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
+  Array<double> scratch_;
+  Components<double> direction_;  // [vertex, 3] of the solver of q
   ViscosityViews views_;
 };
 

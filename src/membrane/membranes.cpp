@@ -44,14 +44,9 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   types_ = types.references;
   std::vector<TriangleMesh> bodies;
   std::vector<HeldCell> held;
-  bool viscous = false, tangential = false;
   for (std::size_t c = 0; c < cells.size(); ++c) {
     bodies.push_back(placed_mesh(types_[types.of_cell[c]], cells[c]));
     held.push_back({types.of_cell[c], int(c)});
-  }
-  for (const CellReference& type : types_) {
-    viscous |= type.law.central_damping > 0;
-    tangential |= type.law.tangential_damping > 0;
   }
   describe_cells(held, int(held.size()));
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
@@ -62,7 +57,23 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   status_host_ = HostCopy(views_.status);
   start_x_ = Components<double>(label("start_x_vertex"), views_.vertices, 3);
   start_v_ = Components<double>(label("start_v_vertex"), views_.vertices, 3);
-  if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(views_, tangential);
+  make_viscosity();
+  if (viscosity_) viscosity_->make_room(views_);
+}
+
+void Membranes::make_viscosity() {
+  bool viscous = false, tangential = false;
+  for (const CellReference& type : types_) {
+    viscous |= type.law.central_damping > 0;
+    tangential |= type.law.tangential_damping > 0;
+  }
+  if (viscous) viscosity_ = std::make_unique<MembraneViscosity>(tangential);
+}
+
+std::vector<Components<double>> Membranes::carried() const {
+  std::vector<Components<double>> fields{views_.surface.x, views_.surface.v};
+  if (viscosity_) fields.push_back(viscosity_->given());
+  return fields;
 }
 
 Membranes::~Membranes() = default;
@@ -116,6 +127,13 @@ void Membranes::compute_forces() {
   take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   elasticity_->membrane_forces(views_, views_.surface.x, views_.force);
+  if (const int cell = trouble(); cell >= 0) explain(cell, 0);
+}
+
+void Membranes::resist(double beta, const Components<double>& force) {
+  if (!viscosity_ || views_.cells == 0) return;
+  Kokkos::deep_copy(views_.status, 0);
+  viscosity_->resist(views_, motion_, beta, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 

@@ -64,7 +64,7 @@ class Membranes {
   /// Rest states as if all cells were `size` times as large as their types are.
   void rest_at_size(double size);
   /// What belongs to the own cells' vertices from one step to the next, and travels with them: [vertex, 3] each.
-  std::vector<Components<double>> carried() const { return {views_.surface.x, views_.surface.v}; }
+  std::vector<Components<double>> carried() const;
   const std::vector<CellReference>& types() const { return types_; }
   /// One body for each type, as it is made or read; only with hold().
   const SurfaceSet& templates() const { return templates_; }
@@ -96,6 +96,12 @@ class Membranes {
   /// Internal forces at the present positions into views().force [vertex, 3] nN.
   /// @throws ComputationError  if a triangle is strained beyond the limit of its law
   void compute_forces();
+  /// Of membranes that move with a fluid, once `force` holds all that acts on the fluid but membrane viscosity (views().force, or
+  /// that and what else acts), [vertex, 3] nN: take what that resists, as the fluid will move them, off `force` and views().force.
+  /// Uses none of the workspace. surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
+  /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
+  ///              deformations; twice that is too much
+  void resist(double beta, const Components<double>& force);
 
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
   int substeps(double dt_us, double beta) const;
@@ -158,6 +164,7 @@ class Membranes {
     long calls = 0;
   };
 
+  void make_viscosity();
   void describe_cells(const std::vector<HeldCell>& cells, int own);
   void make_room(const SurfaceSet& needed);
   void take_workspace();

@@ -116,7 +116,7 @@ auto type_key(const CellSettings& c) {
   return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align,
                   c.mass_pg, c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation,
                   c.shear_modulus_uN_per_m, c.bending_modulus_fJ, c.area_modulus_uN_per_m,
-                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.dissipation);
+                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.viscosity_ratio, c.dissipation);
 }
 
 }  // namespace
@@ -126,6 +126,7 @@ CellReference make_reference(const CellSettings& cell) {
   r.law = make_law(cell);
   r.in_plane = make_in_plane_law(cell);
   r.mesh = make_mesh(cell);
+  r.viscosity_ratio = cell.viscosity_ratio;
   const int vertices = int(r.mesh.vertices.size());
   r.law.vertex_mass = cell.mass_pg / vertices;
   measure(r);
@@ -154,7 +155,13 @@ CellReference make_reference(const CellSettings& cell) {
 }
 
 TriangleMesh placed_mesh(const CellReference& reference, const CellSettings& cell) {
-  return transform(reference.mesh, cell.axis, cell.spin_deg, cell.center_um);
+  TriangleMesh mesh = reference.mesh;
+  const Triple& s = cell.start_stretch;
+  const double whole = std::cbrt(s[0] * s[1] * s[2]);  // of the volume, which is kept
+  if (s != Triple{1, 1, 1})
+    for (Triple& p : mesh.vertices)
+      for (int d = 0; d < 3; ++d) p[d] *= s[d] / whole;
+  return transform(mesh, cell.axis, cell.spin_deg, cell.center_um);
 }
 
 bool same_type(const CellSettings& a, const CellSettings& b) { return type_key(a) == type_key(b); }

@@ -24,6 +24,7 @@ struct CellReference {
   std::vector<std::array<double, 3>> rest_length;  // [triangle] um, of the side opposite each corner
   std::vector<std::array<double, 3>> rest_angle;   // [triangle] rad, of that side, positive where convex outward
   std::vector<double> rest_area;                   // [triangle] um2
+  double viscosity_ratio = 1;                      // of the fluid inside over that outside
   double smallest_vertex_area = 0;                 // um2, over the vertices of the mesh
   std::optional<RelaxedShape> relaxed;             // of reference "spheroid": what the mesh is then
 };

@@ -4,6 +4,7 @@
 
 #include "transfer/delta.hpp"
 #include "transfer/marker_bins.hpp"
+#include "transfer/sharpen.hpp"
 #include "transfer/transfer_kernels.hpp"
 
 namespace corpuscle {
@@ -67,7 +68,10 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   for (int d = 0; d < 3; ++d) {
     block_.area[d] = views.face_area[d];
     faces_.across[d] = Array<double>("corpuscle::transfer::across", cells);
+    block_.sharp_area[d] = views.face_area[d];
   }
+  with_kernel([&](auto delta) { moment_ = decltype(delta)::moment; });
+  if (moment_ > 0) prepare_sharpening();
   set_reflections(boundaries, block_);
   search_.lattice = block_.lattice;
   largest_spacing_ = find_bounds(block_.lattice, search_);
@@ -130,18 +134,51 @@ int Transfer::place(const Components<double>& x) {
   return beyond < no_vertex ? beyond : -1;
 }
 
+/// Areas of the faces as the kernel sees them; the faces' own where that changes nothing, on uniform grids.
+void Transfer::prepare_sharpening() {
+  const IndexSpace& index = block_.index();
+  double most = 0;
+  Components<double> sharp[3];
+  for (int d = 0; d < 3; ++d) {
+    raw_[d] = Array<double>("corpuscle::transfer::raw_face", index.size());
+    sharp_flux_[d] = Array<double>("corpuscle::transfer::sharp_flux", index.size());
+    sharp[d] = Components<double>("corpuscle::transfer::sharp_area", index.size(), 3);
+    for (int m = 0; m < 3; ++m)
+      sharpen_faces(block_, Sharpen::areas, d, moment_, {}, Kokkos::subview(block_.area[d], Kokkos::ALL, m),
+                    Kokkos::subview(sharp[d], Kokkos::ALL, m));
+    grid_->halo().exchange(sharp[d]);
+    most = std::max(most, largest_difference(index, d, block_.area[d], sharp[d]));
+  }
+  constexpr double round_off = 1e-12;
+  if (grid_->comm().max(most) < round_off) return;
+  for (int d = 0; d < 3; ++d) block_.sharp_area[d] = sharp[d];
+}
+
 void Transfer::spread(const Components<double>& force) {
+  const bool sharp = moment_ > 0;
+  const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
   with_kernel([&](auto delta) {
     resolve_forces<decltype(delta)>(block_, markers_, force);
-    spread_forces<decltype(delta)>(block_, markers_, faces_);
+    spread_forces<decltype(delta)>(block_, markers_, spread);
   });
-  for (const auto& across : faces_.across) grid_->halo().exchange(across);
+  for (int d = 0; d < 3; ++d) {
+    grid_->halo().exchange(spread.across[d]);
+    if (!sharp) continue;
+    sharpen_faces(block_, Sharpen::forces, d, moment_, {}, raw_[d], faces_.across[d]);
+    grid_->halo().exchange(faces_.across[d]);
+  }
 }
 
 void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                            const Components<double>& velocity) {
   Kokkos::deep_copy(Exec(), velocity, 0.0);
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, flux, u, markers_, velocity); });
+  const bool sharp = moment_ > 0;
+  for (int d = 0; d < 3 && sharp; ++d) {
+    copy_faces(block_.index(), d, flux[d], raw_[d]);
+    grid_->halo().exchange(raw_[d]);
+    sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
+  }
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity); });
   if (slip) add_slip(block_, *slip, markers_, velocity);
 }
 
@@ -150,6 +187,12 @@ SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& fo
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
   return {law, viscosity, force, surface.normal, surface.area, gap};
+}
+
+double Transfer::marker_radius() const {
+  double radius = 0;
+  with_kernel([&](auto delta) { radius = decltype(delta)::radius; });
+  return radius;
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }

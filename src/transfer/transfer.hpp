@@ -44,10 +44,15 @@ class Transfer {
   /// The widest spacing of this rank's block, um.
   double largest_spacing() const { return largest_spacing_; }
   int markers() const { return markers_.count; }
+  /// Of the sphere that moves as a vertex alone, spacings.
+  double marker_radius() const;
   const MarkerViews& views() const { return markers_; }
   const TransferBlock& block() const { return block_; }
+  const MarkerSearch& search() const { return search_; }
+  const VertexPlaces& places() const { return places_; }
 
  private:
+  void prepare_sharpening();
   void make_places(int vertices);
   void make_room(int markers);
   template <class Use>
@@ -64,6 +69,8 @@ class Transfer {
   int room_ = 0;
   double largest_spacing_ = 0;
   FaceForce faces_;
+  double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing
+  Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then
 };
 
 }  // namespace corpuscle

@@ -257,7 +257,11 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell(force + "robin_coefficient_pg_per_um2_per_us = 1"), {":14: coupling.robin_coefficient", "move with the fluid"});
   for (const char* key : {"kernel = \"three-point\"", "slip = true"})
     require_parts(cell("[coupling]\n" + std::string(key)), {":13: coupling." + std::string(key), "only scheme = \"force\""});
-  require_parts(cell("membrane_viscosity_N_s_per_m = 1e-7\n" + force), {":12: cells.0.membrane_viscosity_N_s_per_m", "must be 0"});
+  REQUIRE(cell("membrane_viscosity_N_s_per_m = 1e-7\nviscosity_ratio = 5\n" + force) == "accepted");
+  for (const char* key : {"viscosity_ratio = 0.05", "viscosity_ratio = 60"})
+    require_parts(cell(std::string(key) + "\n" + force), {":12: cells.0." + std::string(key), "from 0.1 to 50", "inside over that outside"});
+  require_parts(cell("viscosity_ratio = 5"), {":12: cells.0.viscosity_ratio", "coupling.scheme = \"force\"", "no fluid inside"});
+  require_parts(cell("start_stretch = [1, 3, 1]"), {":12: cells.0.start_stretch", "from 0.5 to 2"});
   require_parts(cell("[coupling]\nscheme = \"iterated\"\ntolerance = 1"), {":14: coupling.tolerance = 1", "from 1e-12 to 0.5"});
   for (const char* key : {"tolerance = 1e-4", "max_iterations = 5", "acceleration = \"aitken\"", "robin_in_iterated = false"})
     require_parts(cell("[coupling]\n" + std::string(key)),

@@ -90,15 +90,15 @@ PlateSpeeds plate_speeds(double gap) {
 }  // namespace
 
 TEST_CASE("the slip correction is right beside a wall, down to no gap", "[transfer]") {
-  // Without it the plate is too slow by a quarter of a spacing's shear at all gaps above half a spacing.
+  // Without it the plate is too slow by a tenth of a spacing's shear at all gaps, and by half as much again at half a spacing.
   for (double gap : {0.05, 0.1, 0.25, 0.5, 0.75, 1.0, 1.4, 2.0}) {
     const PlateSpeeds speed = plate_speeds(gap);
     if (std::getenv("CORPUSCLE_SHOW"))
       WARN(fmt::format("gap {} h: {:+.3f} h without slip, {:+.3f} h with", gap, speed.without - speed.exact,
                        speed.with - speed.exact));
     INFO("gap " << gap << " h");
-    CHECK(std::abs(speed.with - speed.exact) < 0.025);  // of 0.25 to 0.28, which depends on the place between the nodes
-    if (gap >= 0.5) CHECK(speed.without - speed.exact < -0.2);
+    CHECK(std::abs(speed.with - speed.exact) < 0.055);  // of up to 0.15
+    if (gap >= 0.5) CHECK(speed.without - speed.exact < -0.07);
   }
 }
 

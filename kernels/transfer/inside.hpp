@@ -1,0 +1,217 @@
+// How much of each grid cell is inside membranes: signed crossings of the grid's index lines with triangles, counted in
+// integers, so that neither the order of the sums nor rounding in the geometry matters. In index space triangles are
+// flat and vertices are rounded to a fine lattice: whether a line meets a triangle is then decided exactly, and a
+// closed surface never leaks.
+#pragma once
+
+#include "transfer/find_markers.hpp"
+
+namespace corpuscle {
+
+/// A spacing is this many units: errors of 1e-6 spacings.
+constexpr int inside_bits = 20;
+constexpr std::int64_t inside_unit = std::int64_t(1) << inside_bits;
+
+/// For each direction, over the cells of the block in units: first what the crossings of the line through a cell change
+/// there, then what they add up to, the part of the cell that is inside. The last halo cell below a line holds where it
+/// starts from.
+struct InsideViews {
+  Array<int> part[3];  // [cell]
+};
+
+/// Triangles whose interior is `material`, by the cell they are of. Copies of cells beyond periodic sides are bodies of their own.
+struct InsideSurface {
+  Table<int> triangle;       // [triangle, 3] vertex numbers
+  Array<int> triangle_body;  // [triangle]
+  Array<int> type;           // [body]
+  Array<int> material;       // [type]
+  Table<int> turns;          // [body, 3] periods by which it has been shifted to where this block sees it
+};
+
+/// Where a vertex is in index space, in units. @returns false if it was not found
+KOKKOS_INLINE_FUNCTION bool place_in_units(const MarkerSearch& s, const VertexPlaces& places, int v, std::int64_t (&at)[3]) {
+  if (!places.known(v)) return false;
+  const double xi[3] = {places.xi(v, 0), places.xi(v, 1), places.xi(v, 2)};
+  LatticePoint q;
+  s.lattice.set(q, xi);
+  double eta[3];
+  lattice_to_index(s.lattice, q, eta);
+  for (int d = 0; d < 3; ++d) at[d] = static_cast<std::int64_t>(std::floor(eta[d] * inside_unit + 0.5));
+  return true;
+}
+
+/// Which side of the line from a to b the origin is on, in a plane: +1 left, -1 right. A tie goes as for an origin
+/// moved by a little along the first axis and by much less along the second, so that both triangles of an edge agree; 0
+/// only if a = b.
+KOKKOS_INLINE_FUNCTION int side_of_edge(const std::int64_t (&a)[2], const std::int64_t (&b)[2]) {
+  const std::int64_t area = a[0] * b[1] - a[1] * b[0], up = a[1] - b[1], along = b[0] - a[0];
+  const std::int64_t decides = area != 0 ? area : (up != 0 ? up : along);
+  return decides > 0 ? 1 : (decides < 0 ? -1 : 0);
+}
+
+/// Where the line along d that passes through zero of the other two coordinates meets a triangle, in units along d.
+/// @returns +1 if the line enters the surface there, -1 if it leaves, 0 if they do not meet
+KOKKOS_INLINE_FUNCTION int cross_triangle(const std::int64_t (&corner)[3][2], const std::int64_t (&along)[3],
+                                          std::int64_t& at) {
+  int turn = 0;
+  std::int64_t weight[3], total = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int b = k == 2 ? 0 : k + 1, c = k == 0 ? 2 : k - 1;
+    const int side = side_of_edge(corner[b], corner[c]);
+    if (side == 0 || (k > 0 && side != turn)) return 0;
+    turn = side;
+    weight[k] = corner[b][0] * corner[c][1] - corner[b][1] * corner[c][0];
+    total += weight[k];
+  }
+  const double share1 = static_cast<double>(weight[1]) / static_cast<double>(total),
+               share2 = static_cast<double>(weight[2]) / static_cast<double>(total);
+  const double beyond_first =
+      share1 * static_cast<double>(along[1] - along[0]) + share2 * static_cast<double>(along[2] - along[0]);
+  at = along[0] + static_cast<std::int64_t>(std::floor(beyond_first + 0.5));
+  return -turn;  // its normal, which points outward, has the sign of `turn` along d
+}
+
+KOKKOS_INLINE_FUNCTION std::int64_t floor_units(std::int64_t a) { return a >> inside_bits; }
+
+/// What a triangle changes on the lines along d of this block.
+KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int64_t (&corner)[3][3], int d, int turns,
+                                          const Array<int>& part) {
+  const IndexSpace& index = lattice.index;
+  constexpr std::int64_t half = inside_unit / 2;
+  const int e = (d + 1) % 3, f = (d + 2) % 3, plane[2] = {e, f};
+  int first[2], last[2];
+  for (int m = 0; m < 2; ++m) {
+    std::int64_t low = corner[0][plane[m]], high = low;
+    for (int k = 1; k < 3; ++k) {
+      const std::int64_t value = corner[k][plane[m]];
+      low = value < low ? value : low;
+      high = value > high ? value : high;
+    }
+    const std::int64_t most = index.n[plane[m]] - 1;
+    first[m] = static_cast<int>(low > 0 ? floor_units(low) : 0);
+    last[m] = static_cast<int>(floor_units(high) < most ? floor_units(high) : most);
+  }
+  const std::int64_t along[3] = {corner[0][d], corner[1][d], corner[2][d]};
+  for (int b = first[1]; b <= last[1]; ++b)
+    for (int a = first[0]; a <= last[0]; ++a) {
+      std::int64_t relative[3][2];
+      for (int k = 0; k < 3; ++k) {
+        relative[k][0] = corner[k][e] - a * inside_unit;
+        relative[k][1] = corner[k][f] - b * inside_unit;
+      }
+      std::int64_t at = 0;
+      const int sign = cross_triangle(relative, along, at);
+      if (sign == 0) continue;
+      std::int64_t from_side = at + half;  // of the block
+      if (lattice.boundary_above[d] && from_side >= index.n[d] * inside_unit) from_side = index.n[d] * inside_unit - 1;
+      const std::int64_t cell = floor_units(from_side);
+      if (cell < 0 || cell >= index.n[d]) continue;
+      const int within = static_cast<int>(from_side - cell * inside_unit);  // of the cell, before the crossing
+      int where[3];
+      where[d] = static_cast<int>(cell), where[e] = a, where[f] = b;
+      const int c = index.cell(where[0], where[1], where[2]), s = index.stride(d);
+      Kokkos::atomic_add(&part(c), sign * (static_cast<int>(inside_unit) - within));
+      Kokkos::atomic_add(&part(c + s), sign * within);
+      if (turns != 0)
+        Kokkos::atomic_add(&part(c - (static_cast<int>(cell) + 1) * s), sign * turns * static_cast<int>(inside_unit));
+    }
+}
+
+/// Fills `inside` with the changes along each line. A line that comes in through a periodic side is inside as often as,
+/// over all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface
+/// whose earlier crossings are at the other end. Any sum of integers is the same in any order.
+inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface,
+                            int triangles, int material, const InsideViews& inside) {
+  for (const auto& part : inside.part) Kokkos::deep_copy(Exec(), part, 0);
+  const MarkerSearch s = search;
+  const VertexPlaces places = vertex_places;
+  const InsideSurface of = surface;
+  const InsideViews out = inside;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::inside_crossings", Policy(0, triangles), KOKKOS_LAMBDA(int t) {
+        const int body = of.triangle_body(t);
+        if (of.material(of.type(body)) != material) return;
+        std::int64_t corner[3][3];
+        for (int k = 0; k < 3; ++k)
+          if (!place_in_units(s, places, of.triangle(t, k), corner[k])) return;
+        const IndexSpace& index = s.lattice.index;
+        for (int d = 0; d < 3; ++d) {
+          std::int64_t low = corner[0][d], high = low;
+          for (int k = 1; k < 3; ++k)
+            low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
+          if (high < -inside_unit || low > index.n[d] * inside_unit) return;
+        }
+        for (int d = 0; d < 3; ++d) add_crossings(s.lattice, corner, d, of.turns(body, d), out.part[d]);
+      });
+}
+
+/// The line of cells along d with number `line`: the cell below its first.
+KOKKOS_INLINE_FUNCTION int line_start(const IndexSpace& index, int d, int line) {
+  const int e = d == 0 ? 1 : 0, f = d == 2 ? 1 : 2;
+  int at[3];
+  at[d] = -1, at[e] = line % index.n[e], at[f] = line / index.n[e];
+  return index.cell(at[0], at[1], at[2]);
+}
+inline int count_lines(const IndexSpace& index, int d) { return index.owned() / index.n[d]; }
+
+/// ends [2 lines]: what each line starts from, then the sum of its changes.
+inline void sum_lines_inside(const IndexSpace& index, int d, const Array<int>& part, const Array<int>& ends) {
+  const int lines = count_lines(index, d), n = index.n[d], s = index.stride(d);
+  Kokkos::parallel_for(
+      "corpuscle::transfer::inside_ends", Policy(0, lines), KOKKOS_LAMBDA(int line) {
+        const int start = line_start(index, d, line);
+        int sum = 0;
+        for (int i = 1; i <= n + 1; ++i) sum += part(start + i * s);
+        ends(line) = part(start);
+        ends(lines + line) = sum;
+      });
+}
+inline void set_line_starts(const IndexSpace& index, int d, const Array<int>& ends, const Array<int>& part) {
+  Kokkos::parallel_for(
+      "corpuscle::transfer::inside_starts", Policy(0, count_lines(index, d)),
+      KOKKOS_LAMBDA(int line) { part(line_start(index, d, line)) = ends(line); });
+}
+
+/// From changes to what is inside, along every line. Where no other rank has a part of the lines, all changes of a line
+/// add up to nothing, or it has met a surface that is not closed: broken(0) = 1.
+inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Array<int>& part,
+                          const Array<int>& broken) {
+  const int n = index.n[d], s = index.stride(d);
+  Kokkos::parallel_for(
+      "corpuscle::transfer::inside", Policy(0, count_lines(index, d)), KOKKOS_LAMBDA(int line) {
+        const int start = line_start(index, d, line);
+        int sum = part(start);
+        for (int i = 1; i <= n; ++i) {
+          sum += part(start + i * s);
+          part(start + i * s) = sum;
+        }
+        sum += part(start + (n + 1) * s);
+        if (alone && sum != part(start)) Kokkos::atomic_fetch_max(&broken(0), 1);
+      });
+}
+
+/// Means over each cell of the viscosity over that outside, and of its inverse.
+struct CytosolViews {
+  Array<double> relative, fluidity;  // [cell]
+};
+
+/// Adds what a fluid of `ratio` does to them by the part of each cell that is inside, the mean of the three directions';
+/// `first`: from 1. @param least  what no viscosity is below, where surfaces overlap too
+inline void add_relative_viscosity(const IndexSpace& index, const InsideViews& inside, double ratio, bool first, double least,
+                                   const CytosolViews& cytosol) {
+  const double whole = 3.0 * inside_unit;
+  const auto p0 = inside.part[0], p1 = inside.part[1], p2 = inside.part[2];
+  const CytosolViews out = cytosol;
+  for_owned(
+      "corpuscle::transfer::inside_viscosity", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        const double sum = static_cast<double>(p0(c)) + p1(c) + p2(c);
+        const double share = sum < 0 ? 0 : (sum > whole ? 1 : sum / whole);  // where surfaces overlap
+        const double relative = (first ? 1.0 : out.relative(c)) + (ratio - 1) * share;
+        const double fluidity = (first ? 1.0 : out.fluidity(c)) + (1 / ratio - 1) * share;
+        out.relative(c) = relative > least ? relative : least;
+        out.fluidity(c) = fluidity * out.relative(c) > 1 ? fluidity : 1 / out.relative(c);
+      });
+}
+
+}  // namespace corpuscle
