@@ -106,12 +106,16 @@ KOKKOS_INLINE_FUNCTION FlowPlace locate_in_flow(const FlowFrame& f, const Vec3& 
   return place;
 }
 
-/// Which of `windows` equal parts of the length a place is in; -1 beyond the ends.
-KOKKOS_INLINE_FUNCTION int window_of(const FlowFrame& f, const Vec3& x, const FlowPlace& place, int windows) {
+/// How far along a place is, in windows of which the length has so many; continuous through periodic sides.
+KOKKOS_INLINE_FUNCTION double windows_along(const FlowFrame& f, const Vec3& x, const FlowPlace& place, int windows) {
   const double way = f.kind == FlowFrame::Kind::slit ? dot(x - f.origin, f.station_axis) : place.along;
-  const double share = way / f.length, within = f.periodic ? share - std::floor(share) : share;
-  const int window = static_cast<int>(std::floor(within * windows));
-  if (f.periodic) return window >= windows ? 0 : window;
+  return way / f.length * windows;
+}
+
+/// The window itself, of those there are; -1 beyond the ends.
+KOKKOS_INLINE_FUNCTION int window_number(const FlowFrame& f, double along, int windows) {
+  const int window = static_cast<int>(std::floor(along));
+  if (f.periodic) return ((window % windows) + windows) % windows;
   return window >= 0 && window < windows ? window : -1;
 }
 

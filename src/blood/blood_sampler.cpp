@@ -131,8 +131,8 @@ void BloodSampler::measure_flow() {
 
 /// Between the wall and the outermost membrane in each window, seen from each side; the mean of all windows with a cell.
 void BloodSampler::measure_layer() {
-  const auto& set = simulation_.membranes()->surfaces();
-  find_core_edge(set, simulation_.membranes()->vertices(), frame_, windows_, edge_);
+  const Membranes& membranes = *simulation_.membranes();
+  find_core_edge(membranes.surfaces(), membranes.views().triangles, frame_, windows_, edge_);
   std::vector<double> edge(edge_.size());
   const auto& host = edge_host_.read();
   std::copy_n(host.data(), edge.size(), edge.begin());

@@ -5,6 +5,7 @@
 #include "../fluid/fluid_fixture.hpp"
 #include "../verification/order.hpp"
 #include "blood/cell_flow.hpp"
+#include "blood/cell_shape.hpp"
 #include "blood/core_edge.hpp"
 #include "blood/guided_flow.hpp"
 #include "immersed/surface.hpp"
@@ -74,7 +75,7 @@ double within(double sphere, double cylinder) {
 double layer_of(const FlowFrame& frame, const std::vector<TriangleMesh>& meshes, int windows) {
   const SurfaceSet set = make_surface_set(meshes, static_cast<int>(meshes.size()));
   const Table<double> edge("corpuscle::test::edge", windows, view_count(frame));
-  find_core_edge(set, set.vertices, frame, windows, edge);
+  find_core_edge(set, set.triangles, frame, windows, edge);
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), edge);
   double sum = 0;
   int count = 0;
@@ -105,11 +106,18 @@ TEST_CASE("a cell's volume within each radius and its flow are exact", "[blood]"
   SECTION("beside the axis, turning about itself") {
     const Vec3 center{1.5, 1, 3};
     const auto beside = moved(sphere, {1.5, 1, 3});
-    const auto sums = sums_of(frame, bins, {beside}, [&](const Vec3& x) {
-      const Vec3 spin{0.2, 0.5, -0.3};
-      return Vec3{0, 0, 0.1} + cross(spin, x - center);
-    });
-    CHECK(sums[CellFlowColumn::flow] == Approx(volume(sphere) * 0.1).epsilon(1e-3));
+    const Vec3 spin{0.2, 0.5, -0.3};
+    const auto sums = sums_of(frame, bins, {beside}, [&](const Vec3& x) { return Vec3{0, 0, 0.1} + cross(spin, x - center); });
+    Sums<10> moments;
+    for (const auto& t : beside.triangles) {
+      Vec3 corner[3];
+      for (int k = 0; k < 3; ++k)
+        for (int d = 0; d < 3; ++d) corner[k][d] = beside.vertices[t[k]][d];
+      moments += tetrahedron_moments(corner);
+    }
+    // A quadratic integrand: exact, of what the mesh encloses.
+    const Vec3 off = Vec3{moments[1], moments[2], moments[3]} - moments[0] * center;
+    CHECK(sums[CellFlowColumn::flow] == Approx(0.1 * moments[0] + cross(spin, off).z).epsilon(1e-11));
     CHECK(sums[CellFlowColumn::within + bins - 1] == Approx(volume(sphere)).epsilon(1e-4));
     double inner = 0;  // the sphere's height over each place of the innermost bin
     constexpr int rings = 50;
@@ -161,6 +169,9 @@ TEST_CASE("the cell-free layer is what the outermost membranes leave, seen from 
   double both = 0;
   for (int k = 0; k < 16; ++k) both += 5 - (2 + 1.5 * std::abs(std::cos(2 * pi * k / 16))) * 1.0;
   CHECK(layer_of(frame, {moved(sphere, {1.5, 0, 4}), moved(sphere, {-1.5, 0, -4})}, 1) == Approx(both / 16).margin(0.02));
+  // A mesh far coarser than the windows leaves none out.
+  const double coarse = layer_of(frame, {ellipsoid_mesh({2, 2, 2}, 42)}, 100), fine = layer_of(frame, {sphere}, 100);
+  CHECK(coarse == Approx(fine).margin(0.2));
   // In short windows they do not hide behind each other, and windows without a cell say nothing. On both sides of the
   // periodic end it is one cell.
   const double split = layer_of(frame, {moved(sphere, {0, 0, 10})}, 20), whole = layer_of(frame, {sphere}, 20);
