@@ -26,7 +26,7 @@ fs::path write_case(const fs::path& folder, const std::string& name, bool sheare
     out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6) << ", "
         << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
   out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.1\n[blood]\nfrom_us = 20\n"
-         "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\n";
+         "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\nhistory_every_us = 20\n";
   return folder / (name + ".toml");
 }
 
@@ -96,12 +96,23 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   // Of many cells each one's shape is with its other figures.
   CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/deformation").size() == 18);
   CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/tank_treading_deg").size() == 18);
+  // And at the history's times, in a series of its own.
+  const auto deformation = data_set(folder / "one/cell_series.h5", "step_000000006/deformation");
+  REQUIRE(deformation.size() == 18);
+  CHECK(deformation[4] > 0);
+  CHECK(data_set(folder / "one/cell_series.h5", "step_000000008/centroid_um") ==
+        data_set(folder / "one/cells.h5", "step_000000008/per_cell/centroid_um"));
+  const auto listed = contents(folder / "one/cell_series.xdmf");
+  CHECK_THAT(listed, Catch::Contains("CollectionType=\"Temporal\"") && Catch::Contains("Polyvertex") && Catch::Contains("deformation"));
 #ifdef CORPUSCLE_MPI
   for (int ranks : {2, 4}) {
     const std::string out = "on_" + std::to_string(ranks);
     succeed(folder, {"run", name, "--out", out}, {1, ranks});
     INFO(out);
     CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") < 1e-8);  // round-off, grown over eight steps
+    const auto on_ranks = data_set(folder / out / "cell_series.h5", "step_000000006/deformation");
+    REQUIRE(on_ranks.size() == 18);
+    for (int n = 0; n < 18; ++n) CHECK(on_ranks[n] == Approx(deformation[n]).margin(1e-9));
   }
 #endif
   // Stopped at 40 us and gone on from there: the same bits.
@@ -111,8 +122,14 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   CHECK(report(folder / "parts")["blood"] == blood);
   for (const char* set : {"hematocrit", "velocity_mm_per_s"})
     CHECK(data_set(folder / "parts/blood.h5", std::string("profile/") + set) == data_set(folder / "one/blood.h5", std::string("profile/") + set));
+  CHECK(data_set(folder / "parts/cell_series.h5", "step_000000006/deformation") == deformation);
+  CHECK(contents(folder / "parts/cell_series.xdmf") == listed);
+  // They are results: another run does not write among them unasked.
+  fs::remove(folder / "parts/report.json");
+  for (const char* file : {"history.csv", "cells.h5", "fields.h5", "cells.xdmf", "fields.xdmf", "checkpoint.h5"}) fs::copy(folder / "parts" / file, folder / file), fs::remove(folder / "parts" / file);
+  fail(folder, {"run", name, "--out", "parts"}, 2, {"blood.csv"}, {1, 1, "OMP_WAIT_POLICY=passive", false});
   // Other bins cannot go on from what was sampled; sampling begins anew, and says so.
-  const auto anew = succeed(folder, {"run", name, "--out", "anew", "--restart", "parts/checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"}, {1, 1});
+  const auto anew = succeed(folder, {"run", name, "--out", "anew", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"}, {1, 1});
   CHECK_THAT(anew.output, Catch::Contains("sampling begins anew"));
   CHECK(report(folder / "anew")["blood"]["samples"] == 2);
 #endif
