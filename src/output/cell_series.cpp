@@ -56,16 +56,18 @@ void CellSeries::write(double time_us, long step, const Rows& mine, const std::v
 
 std::string CellSeries::describe(const StoredTime& time, const Hdf5File& file) const {
   const std::string own = name + "/" + time.group + ".h5";
+  const auto number = xdmf_item(name + "/" + shared + ".h5", "number", {cells_}, "Int", 4);
+  // With the points' numbers, which are the cells': without a list of them ParaView shows none.
   auto text = fmt::format(
-      "    <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\" NodesPerElement=\"1\"/>\n"
+      "    <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\" NodesPerElement=\"1\">\n     {}\n    </Topology>\n"
       "    <Geometry GeometryType=\"XYZ\">\n     {}\n    </Geometry>\n",
-      cells_, xdmf_item(own, places, {cells_, 3}, "Float", 8));
+      cells_, number, xdmf_item(own, places, {cells_, 3}, "Float", 8));
   for (const auto& table : file.entries("/")) {
     if (table == places) continue;
     const auto shape = file.shape(table);
     text += xdmf_attribute(table, shape.size() == 2 ? 3 : 1, "Node", xdmf_item(own, table, shape, "Float", 8));
   }
-  return text + xdmf_attribute("cell", 1, "Node", xdmf_item(name + "/" + shared + ".h5", "number", {cells_}, "Int", 4));
+  return text + xdmf_attribute("cell", 1, "Node", number);
 }
 
 }  // namespace corpuscle
