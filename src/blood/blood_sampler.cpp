@@ -5,6 +5,8 @@
 #include "core/log.hpp"
 #include "core/units.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -251,6 +253,13 @@ nlohmann::json BloodSampler::report() const {
     put_with_error("relative_apparent_viscosity", "", means_.mean(viscosity), means_.error(viscosity));
   if (plasma_speed_ != 0) block["plasma_mean_speed_mm_per_s"] = plasma_speed_ / units::mm_per_s;
   put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
+  if (block.contains("cell_free_layer_um"))
+    block["cell_free_layer_is"] =
+        fmt::format("between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; windows without "
+                    "a cell are left out",
+                    frame_.length / windows_, view_count(frame_));
+  block["errors_are"] = fmt::format("standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
+                                    RunningMeans::least_blocks);
   return block;
 }
 

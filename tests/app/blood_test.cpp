@@ -122,6 +122,12 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   CHECK(report(folder / "parts")["blood"] == blood);
   for (const char* set : {"hematocrit", "velocity_mm_per_s"})
     CHECK(data_set(folder / "parts/blood.h5", std::string("profile/") + set) == data_set(folder / "one/blood.h5", std::string("profile/") + set));
+#ifdef CORPUSCLE_MPI
+  succeed(folder, {"run", name, "--out", "parts_2", "--set", "time.end_us=40"}, {1, 1});
+  succeed(folder, {"run", name, "--out", "parts_2", "--restart", "parts_2/checkpoint.h5"}, {1, 2});
+  CHECK(largest_difference(folder / "one/blood.csv", folder / "parts_2/blood.csv") < 1e-8);
+  CHECK(report(folder / "parts_2")["blood"]["samples"] == 7);
+#endif
   CHECK(data_set(folder / "parts/cell_series.h5", "step_000000006/deformation") == deformation);
   CHECK(contents(folder / "parts/cell_series.xdmf") == listed);
   // They are results: another run does not write among them unasked.
