@@ -50,7 +50,7 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
   cell_totals_host_ = HostCopy(cell_totals_);
   cell_sums_.resize(cell_totals_.size());
   if (windows_ > 0) {
-    edge_ = Table<double>(uninitialised("corpuscle::blood::edge"), windows_, view_count(frame_));
+    edge_ = Table<double>(uninitialised("corpuscle::blood::edge"), windows_, view_count(frame_) + filled_columns);
     edge_host_ = HostCopy(edge_);
   }
 }
@@ -133,24 +133,13 @@ void BloodSampler::measure_flow() {
   simulation_.grid().comm().sum(profile_sums_.data(), static_cast<int>(profile_sums_.size()));
 }
 
-/// Between the wall and the outermost membrane in each window, seen from each side; the mean of all windows with a cell.
 void BloodSampler::measure_layer() {
   const Membranes& membranes = *simulation_.membranes();
   find_core_edge(membranes.surfaces(), membranes.views().triangles, frame_, windows_, edge_);
-  std::vector<double> edge(edge_.size());
   const auto& host = edge_host_.read();
-  std::copy_n(host.data(), edge.size(), edge.begin());
+  std::vector<double> edge(host.data(), host.data() + edge_.size());
   simulation_.grid().comm().max(edge.data(), static_cast<int>(edge.size()));
-  double sum = 0;
-  long count = 0;
-  const int views = view_count(frame_);
-  for (std::size_t n = 0; n < edge.size(); ++n) {
-    if (edge[n] == nobody) continue;
-    const bool lower = !frame_.tube() && static_cast<int>(n) % views == 1;
-    sum += (lower ? 0 : frame_.width) - edge[n];
-    ++count;
-  }
-  last_.cell_free_layer_um = count > 0 ? sum / static_cast<double>(count) : unknown;
+  last_.cell_free_layer_um = cell_free_layer(frame_, windows_, edge.data());
 }
 
 /// Stress on the walls over that of plasma at the same shear rate.
@@ -255,9 +244,17 @@ nlohmann::json BloodSampler::report() const {
   put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
   if (block.contains("cell_free_layer_um"))
     block["cell_free_layer_is"] =
-        fmt::format("between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; windows without "
-                    "a cell are left out",
+        fmt::format("between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where there is no "
+                    "cell along the flow there is no layer",
                     frame_.length / windows_, view_count(frame_));
+  bool steady = true, known = false;
+  for (const int q : {int(discharge), int(viscosity), int(layer)}) {
+    const double drift = means_.drift_over_chance(q);
+    constexpr double surely = 3;
+    known = known || std::isfinite(drift);
+    steady = steady && !(drift > surely);
+  }
+  block["steady"] = known ? nlohmann::json(steady) : nlohmann::json();
   block["errors_are"] = fmt::format("standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
                                     RunningMeans::least_blocks);
   return block;
