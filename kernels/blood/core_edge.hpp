@@ -14,7 +14,8 @@ KOKKOS_INLINE_FUNCTION int view_count(const FlowFrame& frame) { return frame.tub
 /// Columns of the table beside one for each view: how far up and down along the flow a window is filled.
 inline constexpr int filled_columns = 2;
 
-KOKKOS_INLINE_FUNCTION void reach_out(const FlowFrame& frame, const FlowPlace& place, int window, double within, const Table<double>& edge) {
+KOKKOS_INLINE_FUNCTION void reach_out(const FlowFrame& frame, const FlowPlace& place, int window, double within,
+                                      const Table<double>& edge) {
   if (window < 0) return;
   const int views = view_count(frame);
   for (int k = 0; k < views; ++k) {
@@ -29,11 +30,12 @@ KOKKOS_INLINE_FUNCTION void reach_out(const FlowFrame& frame, const FlowPlace& p
   Kokkos::atomic_fetch_max(&edge(window, views + 1), -within);
 }
 
-/// edge [window, view]: the largest extent in each direction of any membrane in each window, um; `nobody` where there is none. Of
-/// tubes from the centreline; between walls the height, and minus the lowest height. A triangle's extremes in a window are its
-/// corners and where its sides pass into another window. A largest is the same in any order. Then the largest and minus the
-/// smallest share of the window at which there is a membrane.
-inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame& frame, int windows, const Table<double>& edge) {
+/// edge [window, view]: the largest extent in each direction of any membrane in each window, um; `nobody` where there
+/// is none. Of tubes from the centreline; between walls the height, and minus the lowest height. A triangle's extremes
+/// in a window are its corners and where its sides pass into another window. A largest is the same in any order. Then
+/// the largest and minus the smallest share of the window at which there is a membrane.
+inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame& frame, int windows,
+                           const Table<double>& edge) {
   Kokkos::deep_copy(Exec(), edge, nobody);
   const auto x = set.x;
   const auto triangle = set.triangle;
@@ -61,8 +63,8 @@ inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame
       });
 }
 
-/// Between the wall and the outermost membranes, um: the mean over windows and views, each window for what of it is filled. Not a
-/// number without any. @param edge  as find_core_edge() fills it, on the host, a window after the other
+/// Between the wall and the outermost membranes, um: the mean over windows and views, each window for what of it is
+/// filled. Not a number without any. @param edge  as find_core_edge() fills it, on the host, a window after the other
 inline double cell_free_layer(const FlowFrame& frame, int windows, const double* edge) {
   const int views = view_count(frame);
   double sum = 0, weight = 0;

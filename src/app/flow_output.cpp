@@ -240,7 +240,9 @@ void FlowOutput::write_history() {
   measure();
   for (const auto& sample : last_) history_->write(sample);
 #ifdef CORPUSCLE_HDF5
-  if (series_) series_->write(simulation_.time(), simulation_.steps(), cell_rows(*simulation_.shared_cells()), cell_figures().tables());
+  if (!series_) return;
+  const CellFigures figures = cell_figures();
+  series_->write(simulation_.time(), simulation_.steps(), cell_rows(*simulation_.shared_cells()), figures.tables());
 #endif
 }
 
@@ -385,7 +387,12 @@ CellFigures FlowOutput::cell_figures() {
   const auto travelled = simulation_.coupling()->wrapped_by();
   const auto cells = simulation_.membranes()->diagnostics();
   const auto& names = shapes_->columns();
-  CellFigures figures({{"centroid_um", 3}, {"velocity_um_per_us", 3}, {"extent_um", 3}, {"area_um2", 1}, {"volume_um3", 1}, {"elastic_energy_fJ", 1}});
+  CellFigures figures({{"centroid_um", 3},
+                       {"velocity_um_per_us", 3},
+                       {"extent_um", 3},
+                       {"area_um2", 1},
+                       {"volume_um3", 1},
+                       {"elastic_energy_fJ", 1}});
   for (const auto& shape : names) figures.add({shape, 1});
   const auto& shapes = measure_shapes();
   for (std::size_t c = 0; c < cells.size(); ++c) {

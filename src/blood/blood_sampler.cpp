@@ -1,14 +1,14 @@
 #include "blood/blood_sampler.hpp"
 
-#include "blood/cell_flow.hpp"
-#include "blood/core_edge.hpp"
-#include "core/log.hpp"
-#include "core/units.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "blood/cell_flow.hpp"
+#include "blood/core_edge.hpp"
+#include "core/log.hpp"
+#include "core/units.hpp"
 
 namespace corpuscle {
 
@@ -39,7 +39,10 @@ nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::js
 }  // namespace
 
 BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
-    : simulation_(simulation), settings_(*scene.blood), boundaries_(scene.boundaries), flow_(find_guided_flow(scene, simulation.fluid())) {
+    : simulation_(simulation),
+      settings_(*scene.blood),
+      boundaries_(scene.boundaries),
+      flow_(find_guided_flow(scene, simulation.fluid())) {
   if (flow_) frame_ = flow_->frame;
   if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
   bins_ = !frame_.guided() ? 0 : settings_.bins > 0 ? settings_.bins : default_bins(scene, *flow_, simulation.grid());
@@ -90,7 +93,8 @@ void BloodSampler::make_profile() {
     profile_.lengthening = Array<double>(uninitialised("corpuscle::blood::lengthening"), owned);
     find_directions(grid.views(), frame_, profile_);
   }
-  profile_parts_ = Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
+  profile_parts_ =
+      Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
   profile_parts_host_ = HostCopy(profile_parts_);
   profile_sums_.resize(bins * ProfileColumn::count);
   // The share of the whole that a bin is, of the grid's volume: exact for tubes, bent ones too, and between walls.
@@ -114,7 +118,8 @@ void BloodSampler::measure_cells() {
   const Membranes& membranes = *simulation_.membranes();
   const int cells = membranes.cells();
   if (const auto rows = static_cast<std::size_t>(cells) * sections; !cell_parts_.data() || cell_parts_.extent(0) < rows)
-    cell_parts_ = Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
+    cell_parts_ =
+        Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
   sum_cell_flow(membranes.surfaces(), cells, frame_, bins_, cell_parts_, cell_totals_);
   add_ranks(simulation_.grid().comm(), cell_totals_host_.read(), cell_sums_);
 }
@@ -122,7 +127,8 @@ void BloodSampler::measure_cells() {
 /// Volumes and velocities of the bins, of all ranks.
 void BloodSampler::measure_flow() {
   const int bins = std::max(bins_, 1);
-  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins, profile_parts_);
+  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins,
+              profile_parts_);
   const auto& parts = profile_parts_host_.read();
   for (int b = 0; b < bins; ++b)
     for (int q = 0; q < ProfileColumn::count; ++q) {
@@ -155,12 +161,14 @@ double BloodSampler::wall_viscosity() {
     for (int m = 0; m < 3; ++m) velocity[end][m] = wall.velocity ? factor * (*wall.velocity)[m] : 0;
     if (grid.halo().neighbour(d, end) >= 0) continue;
     const auto force_on = fluid.skewed() ? wall_force<true> : wall_force<false>;
-    const auto side = force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
+    const auto side =
+        force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
     sums[2 * end] = side[0], sums[2 * end + 1] = side[1];
   }
   grid.comm().sum(sums, 4);
   const double rate = dot(velocity[1] - velocity[0], frame_.tangent) / frame_.width;
-  const double stress = 0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
+  const double stress =
+      0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
   return rate != 0 ? stress / (fluid.viscosity() * rate) : unknown;
 }
 
@@ -184,13 +192,15 @@ const BloodSample& BloodSampler::sample() {
   if (flow_ && flow_->sheared && frame_.guided()) last_.relative_viscosity = wall_viscosity();
   last_.cell_free_layer_um = unknown;
   if (windows_ > 0) measure_layer();
-  std::vector<double> values{last_.hematocrit, last_.mean_speed, last_.cell_speed, last_.discharge_hematocrit, last_.relative_viscosity,
-                             last_.cell_free_layer_um};
+  std::vector<double> values{last_.hematocrit,           last_.mean_speed,         last_.cell_speed,
+                             last_.discharge_hematocrit, last_.relative_viscosity, last_.cell_free_layer_um};
   for (int b = 0; b < bins_; ++b)
-    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) / bin_volume_[b]);
+    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) /
+                     bin_volume_[b]);
   for (int b = 0; b < bins_; ++b) {
     const double* sums = profile_sums_.data() + b * ProfileColumn::count;
-    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume] : unknown);
+    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume]
+                                                     : unknown);
   }
   means_.add(values);
   return last_;
@@ -243,10 +253,11 @@ nlohmann::json BloodSampler::report() const {
   if (plasma_speed_ != 0) block["plasma_mean_speed_mm_per_s"] = plasma_speed_ / units::mm_per_s;
   put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
   if (block.contains("cell_free_layer_um"))
-    block["cell_free_layer_is"] =
-        fmt::format("between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where there is no "
-                    "cell along the flow there is no layer",
-                    frame_.length / windows_, view_count(frame_));
+    block["cell_free_layer_is"] = fmt::format(
+        "between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where "
+        "there is no "
+        "cell along the flow there is no layer",
+        frame_.length / windows_, view_count(frame_));
   bool steady = true, known = false;
   for (const int q : {int(discharge), int(viscosity), int(layer)}) {
     const double drift = means_.drift_over_chance(q);
@@ -255,8 +266,9 @@ nlohmann::json BloodSampler::report() const {
     steady = steady && !(drift > surely);
   }
   block["steady"] = known ? nlohmann::json(steady) : nlohmann::json();
-  block["errors_are"] = fmt::format("standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
-                                    RunningMeans::least_blocks);
+  block["errors_are"] = fmt::format(
+      "standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
+      RunningMeans::least_blocks);
   return block;
 }
 

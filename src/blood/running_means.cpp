@@ -55,7 +55,8 @@ double RunningMeans::drift(int quantity) const {
   return (trend_[quantity] - middle * levels_.front().sum[quantity]) / squares * (count - 1);
 }
 
-/// The slope of a line through numbers without a trend has the variance of their mean times 12 over their count squared.
+/// The slope of a line through numbers without a trend has the variance of their mean times 12 over their count
+/// squared.
 double RunningMeans::drift_over_chance(int quantity) const {
   return std::abs(drift(quantity)) / (std::sqrt(12.0) * error(quantity));
 }
@@ -66,14 +67,16 @@ std::vector<double> RunningMeans::state() const {
   for (const Level& level : levels_) {
     state.push_back(static_cast<double>(level.blocks));
     state.push_back(level.waiting ? 1 : 0);
-    for (const auto* part : {&level.sum, &level.square, &level.half}) state.insert(state.end(), part->begin(), part->end());
+    for (const auto* part : {&level.sum, &level.square, &level.half})
+      state.insert(state.end(), part->begin(), part->end());
   }
   return state;
 }
 
 bool RunningMeans::set_state(const std::vector<double>& state) {
   const std::size_t width = static_cast<std::size_t>(quantities_), stride = 2 + 3 * width;
-  if (state.size() < 1 + 2 * width || state[0] != quantities_ || (state.size() - 1 - 2 * width) % stride != 0) return false;
+  if (state.size() < 1 + 2 * width || state[0] != quantities_ || (state.size() - 1 - 2 * width) % stride != 0)
+    return false;
   auto at = state.begin() + 1;
   const auto take = [&] {
     std::vector<double> values(at, at + quantities_);

@@ -5,14 +5,16 @@
 
 namespace corpuscle {
 
-/// Blocks of 1, 2, 4, ... samples in a row: the spread of their means tells the error of the whole mean once blocks are longer
-/// than the correlation (Flyvbjerg & Petersen, J. Chem. Phys. 91, 461, 1989). The error is the largest of the estimates from
-/// lengths with at least `least_blocks` blocks. No sample is kept: memory grows with the logarithm of their number.
+/// Blocks of 1, 2, 4, ... samples in a row: the spread of their means tells the error of the whole mean once blocks are
+/// longer than the correlation (Flyvbjerg & Petersen, J. Chem. Phys. 91, 461, 1989). The error is the largest of the
+/// estimates from lengths with at least `least_blocks` blocks. No sample is kept: memory grows with the logarithm of
+/// their number.
 class RunningMeans {
  public:
   static constexpr long least_blocks = 16;  // then an estimate is good to about 18 %
 
-  explicit RunningMeans(int quantities = 0) : quantities_(quantities), origin_(quantities, 0.0), trend_(quantities, 0.0) {}
+  explicit RunningMeans(int quantities = 0)
+      : quantities_(quantities), origin_(quantities, 0.0), trend_(quantities, 0.0) {}
 
   /// A value of each quantity.
   void add(const std::vector<double>& values);

@@ -17,7 +17,8 @@ const std::string name = "cell_series", shared = "numbers", places = "centroid_u
 
 }  // namespace
 
-CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine, std::optional<double> restart_us)
+CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine,
+                       std::optional<double> restart_us)
     : comm_(comm),
       cells_(cells),
       series_(folder, name, format_name, comm, shared, {"number"},
@@ -28,8 +29,9 @@ CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cell
       stored_times(path, format_name);
       const auto found = Hdf5File::read(path).shape("number");
       if (found != Shape{cells_})
-        throw InputError(fmt::format("{}: cannot continue this file, it has {} cells and this case {}; choose another folder with --out",
-                                     path, found.at(0), cells_));
+        throw InputError(fmt::format(
+            "{}: cannot continue this file, it has {} cells and this case {}; choose another folder with --out", path,
+            found.at(0), cells_));
     });
     series_.resume(*restart_us);
     return;
@@ -47,7 +49,9 @@ CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cell
 void CellSeries::write(double time_us, long step, const Rows& mine, const std::vector<CellTable>& tables) {
   auto file = Hdf5File::create(series_.step_path(step), comm_);
   for (const auto& table : tables)
-    file.write(table.name, table.components == 1 ? Shape{cells_} : Shape{cells_, static_cast<hsize_t>(table.components)}, mine, table.values);
+    file.write(table.name,
+               table.components == 1 ? Shape{cells_} : Shape{cells_, static_cast<hsize_t>(table.components)}, mine,
+               table.values);
   file.attribute("/", "time_us", time_us);
   file.attribute("/", "step", static_cast<std::int64_t>(step));
   file.close();
@@ -59,7 +63,8 @@ std::string CellSeries::describe(const StoredTime& time, const Hdf5File& file) c
   const auto number = xdmf_item(name + "/" + shared + ".h5", "number", {cells_}, "Int", 4);
   // With the points' numbers, which are the cells': without a list of them ParaView shows none.
   auto text = fmt::format(
-      "    <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\" NodesPerElement=\"1\">\n     {}\n    </Topology>\n"
+      "    <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{}\" NodesPerElement=\"1\">\n     {}\n    "
+      "</Topology>\n"
       "    <Geometry GeometryType=\"XYZ\">\n     {}\n    </Geometry>\n",
       cells_, number, xdmf_item(own, places, {cells_, 3}, "Float", 8));
   for (const auto& table : file.entries("/")) {

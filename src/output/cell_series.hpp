@@ -1,4 +1,5 @@
-// cell_series.h5 and cell_series.xdmf: figures of each of many cells at the history's times, as points that ParaView opens.
+// cell_series.h5 and cell_series.xdmf: figures of each of many cells at the history's times, as points that ParaView
+// opens.
 #pragma once
 
 #ifdef CORPUSCLE_HDF5
@@ -11,7 +12,8 @@ class CellSeries {
  public:
   /// Every rank calls. @param mine  rows of this rank's cells; @param restart_us  as CellWriter
   /// @throws InputError  on every rank, if the files cannot be written or the one to continue has other cells
-  CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine, std::optional<double> restart_us);
+  CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine,
+             std::optional<double> restart_us);
 
   /// Store one time; one of the tables is "centroid_um". Every rank calls. A step that is there already is replaced.
   /// @throws ComputationError  on every rank, for example on a full disk

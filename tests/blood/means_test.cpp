@@ -26,7 +26,8 @@ RunningMeans sampled(double memory, int count, unsigned seed) {
 
 TEST_CASE("standard errors are those of correlated samples", "[blood]") {
   for (const double memory : {0.0, 0.8, 0.95}) {
-    // Over many series the mean's spread is what the error says, not the smaller one of samples that know nothing of each other.
+    // Over many series the mean's spread is what the error says, not the smaller one of samples that know nothing of
+    // each other.
     constexpr int series = 40, count = 16000;
     double spread = 0, error = 0, chance = 0;
     for (int s = 0; s < series; ++s) {
@@ -38,7 +39,7 @@ TEST_CASE("standard errors are those of correlated samples", "[blood]") {
     const double exact = std::sqrt((1 + memory) / (1 - memory) / count);
     INFO("memory " << memory << ": exact " << exact << ", told " << error << ", seen " << std::sqrt(spread));
     CHECK(error > 0.9 * exact);
-    CHECK(error < 1.5 * exact);  // the largest of several estimates: a little high
+    CHECK(error < 1.5 * exact);                             // the largest of several estimates: a little high
     CHECK(std::sqrt(chance) == Approx(0.85).margin(0.35));  // one, and less as errors are told a little high
     CHECK(std::sqrt(spread) == Approx(exact).epsilon(0.35));
   }
