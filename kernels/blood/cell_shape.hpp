@@ -9,15 +9,16 @@
 
 namespace corpuscle {
 
-/// Columns of the table that measure_shapes fills, one row a cell. Angles in degrees, in the plane of the flow and the direction
-/// across it, from the flow towards across; where they begin again is aslant, so that no cell that lies along or across the flow
-/// is there.
+/// Columns of the table that measure_shapes fills, one row a cell. Angles in degrees, in the plane of the flow and the
+/// direction across it, from the flow towards across; where they begin again is aslant, so that no cell that lies along
+/// or across the flow is there.
 struct ShapeColumn {
   enum : int {
-    deformation = 0,    // Taylor's: (L - B) / (L + B) of the ellipsoid of equal inertia, its longest and shortest axes
-    inclination = 1,    // of the long axis that it has in the plane, -45 to 135; not a number where that is round
-    membrane_angle = 2, // to which the membrane has carried the cell's own axis, -135 to 225
-    phase = 3,          // from the long axis to there, -45 to 135: constant as the cell tumbles; goes round twice as the membrane does once
+    deformation = 0,     // Taylor's: (L - B) / (L + B) of the ellipsoid of equal inertia, its longest and shortest axes
+    inclination = 1,     // of the long axis that it has in the plane, -45 to 135; not a number where that is round
+    membrane_angle = 2,  // to which the membrane has carried the cell's own axis, -135 to 225
+    phase = 3,  // from the long axis to there, -45 to 135: constant as the cell tumbles; goes round twice as the
+                // membrane does once
     count = 4
   };
 };
@@ -28,8 +29,8 @@ KOKKOS_INLINE_FUNCTION double begin_aslant(double degrees, double period) {
   return degrees - period * std::floor((degrees - first) / period);
 }
 
-/// Where a type's vertices are on its mesh, mapped so that they are spread evenly in all directions: then a cell's vertices are
-/// a rotation, a stretch and a rotation of them, whatever the shape at rest.
+/// Where a type's vertices are on its mesh, mapped so that they are spread evenly in all directions: then a cell's
+/// vertices are a rotation, a stretch and a rotation of them, whatever the shape at rest.
 struct MaterialViews {
   Components<double> place;  // [vertex of all types, 3]
   Array<int> first;          // [type]
@@ -75,8 +76,8 @@ KOKKOS_INLINE_FUNCTION double inclination_deg(const double (&second)[3][3], cons
   return begin_aslant(0.5 * to_degrees * std::atan2(twice_mixed, along - beside), 180);
 }
 
-/// Angle in that plane of the first of the cell's own z, x and y axes that has a part of more than a half in it, as the rotation
-/// has carried it: a turn in the plane changes no such part, so that the choice stays.
+/// Angle in that plane of the first of the cell's own z, x and y axes that has a part of more than a half in it, as the
+/// rotation has carried it: a turn in the plane changes no such part, so that the choice stays.
 KOKKOS_INLINE_FUNCTION double axis_angle_deg(const Vec3 (&rotation)[3], const Vec3& flow, const Vec3& across) {
   constexpr double to_degrees = 180 / 3.14159265358979323846;
   for (int n = 0; n < 3; ++n) {
@@ -95,7 +96,8 @@ inline void measure_shapes(const SurfaceSet& set, int cells, const Array<int>& t
   const auto triangle = set.triangle;
   const auto first_vertex = set.first_vertex, first_triangle = set.first_triangle, first_of_type = material.first;
   Kokkos::parallel_for(
-      "corpuscle::blood::measure_shapes", Kokkos::TeamPolicy<Exec>(cells, Kokkos::AUTO), KOKKOS_LAMBDA(const SectionTeam& team) {
+      "corpuscle::blood::measure_shapes", Kokkos::TeamPolicy<Exec>(cells, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const SectionTeam& team) {
         const int cell = team.league_rank(), first = first_vertex(cell), shift = first_of_type(type(cell)) - first;
         const Vec3 origin = load(x, first);
         Sums<10> moments;

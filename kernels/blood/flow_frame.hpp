@@ -7,12 +7,13 @@
 namespace corpuscle {
 
 struct FlowPlace {
-  double across = 0;   // um: distance to the centreline of a tube, or height over the lower wall
-  double along = 0;    // um: arc length from the tube's beginning, or way along the flow
-  Vec3 outward;        // unit vector in which `across` grows; zero on a centreline
+  double across = 0;               // um: distance to the centreline of a tube, or height over the lower wall
+  double along = 0;                // um: arc length from the tube's beginning, or way along the flow
+  Vec3 outward;                    // unit vector in which `across` grows; zero on a centreline
   Vec3 tangent, normal, binormal;  // of the flow; across it
-  Vec3 offset;         // tubes: from the centreline
-  double bend = 0;     // tubes: curvature . offset; a piece of the tube is (1 - bend) times as long there as on the centreline
+  Vec3 offset;                     // tubes: from the centreline
+  double bend =
+      0;  // tubes: curvature . offset; a piece of the tube is (1 - bend) times as long there as on the centreline
 };
 
 /// Columns of the table of a centreline's stations.
@@ -31,8 +32,8 @@ struct FlowFrame {
   double length = 0;               // of the tube, or of the box along station_axis, um
   bool periodic = false;           // along it
   Vec3 period;                     // of a swept tube
-  Table<double> line;              // [station, LineColumn::count] swept tube: evenly spaced from its beginning to its end
-  int stations = 0, stride = 1;    // stride: of the coarse search, at most half a radius
+  Table<double> line;            // [station, LineColumn::count] swept tube: evenly spaced from its beginning to its end
+  int stations = 0, stride = 1;  // stride: of the coarse search, at most half a radius
   double spacing = 0;
 
   KOKKOS_INLINE_FUNCTION bool tube() const { return kind == Kind::straight || kind == Kind::swept; }
@@ -106,17 +107,21 @@ KOKKOS_INLINE_FUNCTION FlowPlace locate_in_flow(const FlowFrame& f, const Vec3& 
   return place;
 }
 
-/// Which of `windows` equal parts of the length a place is in; -1 beyond the ends.
-KOKKOS_INLINE_FUNCTION int window_of(const FlowFrame& f, const Vec3& x, const FlowPlace& place, int windows) {
+/// How far along a place is, in windows of which the length has so many; continuous through periodic sides.
+KOKKOS_INLINE_FUNCTION double windows_along(const FlowFrame& f, const Vec3& x, const FlowPlace& place, int windows) {
   const double way = f.kind == FlowFrame::Kind::slit ? dot(x - f.origin, f.station_axis) : place.along;
-  const double share = way / f.length, within = f.periodic ? share - std::floor(share) : share;
-  const int window = static_cast<int>(std::floor(within * windows));
-  if (f.periodic) return window >= windows ? 0 : window;
+  return way / f.length * windows;
+}
+
+/// The window itself, of those there are; -1 beyond the ends.
+KOKKOS_INLINE_FUNCTION int window_number(const FlowFrame& f, double along, int windows) {
+  const int window = static_cast<int>(std::floor(along));
+  if (f.periodic) return ((window % windows) + windows) % windows;
   return window >= 0 && window < windows ? window : -1;
 }
 
-/// Outward component of the vector field whose divergence is one nearer to the centreline, or lower, than `edge`, and zero
-/// beyond: its flux through a closed surface is the volume that the surface encloses there.
+/// Outward component of the vector field whose divergence is one nearer to the centreline, or lower, than `edge`, and
+/// zero beyond: its flux through a closed surface is the volume that the surface encloses there.
 KOKKOS_INLINE_FUNCTION double volume_field(const FlowFrame& f, const FlowPlace& place, double edge) {
   const double c = place.across < edge ? place.across : edge;
   if (!f.tube()) return c;

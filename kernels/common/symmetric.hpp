@@ -51,8 +51,8 @@ KOKKOS_INLINE_FUNCTION SymmetricEigen eigen_of(double (&a)[3][3]) {
   return result;
 }
 
-/// Replaces a matrix, given by its columns, by the rotation nearest to it: its polar factor, by Newton's iteration (Higham,
-/// SIAM J. Sci. Stat. Comput. 7, 1986). @returns false if it turns things inside out or flattens them
+/// Replaces a matrix, given by its columns, by the rotation nearest to it: its polar factor, by Newton's iteration
+/// (Higham, SIAM J. Sci. Stat. Comput. 7, 1986). @returns false if it turns things inside out or flattens them
 KOKKOS_INLINE_FUNCTION bool to_rotation(Vec3 (&column)[3]) {
   double square = 0;
   for (const Vec3& c : column) square += dot(c, c);

@@ -89,6 +89,9 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
                                             simulation.grid().owned_nodes().data(), restart_us);
   few_cells_ = simulation.cells() <= scene_.output.cells_in_history || !simulation.shared_cells();
   if (!few_cells_) std::vector<CellSettings>().swap(scene_.cells);  // nothing on a rank grows with the number of all cells
+  // A file a sample, so not in every step.
+  if (!few_cells_ && scene_.output.history_every_us > 0)
+    series_ = std::make_unique<CellSeries>(folder_, comm, simulation.cells(), cell_rows(*simulation.shared_cells()), restart_us);
   if (scene_.output.cells && simulation.shared_cells()) {
     cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
   } else if (scene_.output.cells && simulation.surfaces()) {
@@ -241,6 +244,11 @@ HistorySample FlowOutput::cell_sample(int cell, const CellDiagnostics& d, const 
 void FlowOutput::write_history() {
   measure();
   for (const auto& sample : last_) history_->write(sample);
+#ifdef CORPUSCLE_HDF5
+  if (!series_) return;
+  const CellFigures figures = cell_figures();
+  series_->write(simulation_.time(), simulation_.steps(), cell_rows(*simulation_.shared_cells()), figures.tables());
+#endif
 }
 
 void FlowOutput::measure() {
@@ -378,33 +386,46 @@ void FlowOutput::write_cells() {
 #endif
 }
 
-/// This rank's own, and of each what the history has of few.
+#ifdef CORPUSCLE_HDF5
+/// Of each of this rank's cells what the history has of few.
+CellFigures FlowOutput::cell_figures() {
+  const auto travelled = simulation_.coupling()->wrapped_by();
+  const auto cells = simulation_.membranes()->diagnostics();
+  const auto& names = shapes_->columns();
+  CellFigures figures({{"centroid_um", 3},
+                       {"velocity_um_per_us", 3},
+                       {"extent_um", 3},
+                       {"area_um2", 1},
+                       {"volume_um3", 1},
+                       {"elastic_energy_fJ", 1}});
+  for (const auto& shape : names) figures.add({shape, 1});
+  const auto& shapes = measure_shapes();
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const Triple size = cells[c].extent_um();
+    for (int d = 0; d < 3; ++d) {
+      figures.values[0].push_back(cells[c].centroid_um[d] + travelled[c][d]);
+      figures.values[1].push_back(cells[c].velocity_um_per_us[d]);
+      figures.values[2].push_back(size[d]);
+    }
+    figures.values[3].push_back(cells[c].area_um2);
+    figures.values[4].push_back(cells[c].volume_um3);
+    figures.values[5].push_back(cells[c].energy_fJ());
+    for (std::size_t n = 0; n < names.size(); ++n) figures.values[6 + n].push_back(shapes[c][n]);
+  }
+  return figures;
+}
+#endif
+
+/// This rank's own, with their figures.
 void FlowOutput::write_shared_cells() {
 #ifdef CORPUSCLE_HDF5
   const SharedCells& shared = *simulation_.shared_cells();
   const auto& set = shared.surfaces();
   const auto x = vertex_values(set.own_vertices, set.x), v = vertex_values(set.own_vertices, set.v);
   const auto traction = vertex_values(set.own_vertices, simulation_.coupling()->tractions_for_output());
-  const auto travelled = simulation_.coupling()->wrapped_by();
-  std::vector<double> centroid, velocity, extent, area, volume, energy;
-  const auto cells = simulation_.membranes()->diagnostics();
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    const Triple size = cells[c].extent_um();
-    for (int d = 0; d < 3; ++d) centroid.push_back(cells[c].centroid_um[d] + travelled[c][d]);
-    velocity.insert(velocity.end(), cells[c].velocity_um_per_us.begin(), cells[c].velocity_um_per_us.end());
-    extent.insert(extent.end(), size.begin(), size.end());
-    area.push_back(cells[c].area_um2), volume.push_back(cells[c].volume_um3), energy.push_back(cells[c].energy_fJ());
-  }
-  std::vector<CellTable> tables{{"centroid_um", 3, centroid.data()}, {"velocity_um_per_us", 3, velocity.data()},
-                                {"extent_um", 3, extent.data()},     {"area_um2", 1, area.data()},
-                                {"volume_um3", 1, volume.data()},    {"elastic_energy_fJ", 1, energy.data()}};
-  const auto& names = shapes_->columns();
-  std::vector<std::vector<double>> turned(names.size());
-  for (const auto& row : measure_shapes())
-    for (std::size_t n = 0; n < names.size(); ++n) turned[n].push_back(row[n]);
-  for (std::size_t n = 0; n < names.size(); ++n) tables.push_back({names[n], 1, turned[n].data()});
+  const CellFigures figures = cell_figures();
   cells_->write(simulation_.time(), simulation_.steps(), share_of(shared), x.data(),
-                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}}, tables);
+                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}}, figures.tables());
 #endif
 }
 

@@ -6,7 +6,7 @@
 #include "blood/blood_files.hpp"
 #include "blood/cell_shapes.hpp"
 #include "coupling/energy_balance.hpp"
-#include "output/cell_writer.hpp"
+#include "output/cell_series.hpp"
 #include "output/field_writer.hpp"
 #include "output/history.hpp"
 #include "output/report.hpp"
@@ -16,6 +16,21 @@
 #include <optional>
 
 namespace corpuscle {
+
+#ifdef CORPUSCLE_HDF5
+/// Figures of this rank's cells, a table each.
+struct CellFigures {
+  explicit CellFigures(std::vector<std::pair<std::string, int>> columns) : names(std::move(columns)), values(names.size()) {}
+  void add(const std::pair<std::string, int>& column) { names.push_back(column), values.emplace_back(); }
+  std::vector<CellTable> tables() const {
+    std::vector<CellTable> all;
+    for (std::size_t n = 0; n < names.size(); ++n) all.push_back({names[n].first, names[n].second, values[n].data()});
+    return all;
+  }
+  std::vector<std::pair<std::string, int>> names;  // with their components
+  std::vector<std::vector<double>> values;
+};
+#endif
 
 class FlowOutput {
  public:
@@ -67,6 +82,9 @@ class FlowOutput {
   void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
   void gather_samples();
   void write_shared_cells();
+#ifdef CORPUSCLE_HDF5
+  CellFigures cell_figures();
+#endif
   void sample_blood();
   void fill_blood(Report& report, const ContactReport& contact) const;
 
@@ -79,6 +97,7 @@ class FlowOutput {
 #ifdef CORPUSCLE_HDF5
   std::unique_ptr<FieldWriter> fields_;
   std::unique_ptr<CellWriter> cells_;
+  std::unique_ptr<CellSeries> series_;  // of many cells
 #endif
   std::string last_checkpoint_;
   bool few_cells_ = true;  // each has lines of its own in the history; cells.h5 has what each of many does

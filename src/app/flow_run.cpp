@@ -43,6 +43,7 @@ void tell_missing(const Case& scene, const std::string& checkpoint, const std::s
   expect(simulation.coupling() != nullptr, "history.csv");
   expect(scene.output.fields, "fields.h5");
   expect(scene.output.cells && simulation.surfaces(), "cells.h5");
+  expect(scene.blood && simulation.time() > scene.blood->from_us, "blood.csv");
   if (missing.empty()) return;
   std::error_code ignored;
   const auto text = fmt::format("{} in {} begin{} at {:.6g} us", fmt::join(missing, ", "), folder, missing.size() == 1 ? "s" : "",

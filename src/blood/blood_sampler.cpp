@@ -1,12 +1,14 @@
 #include "blood/blood_sampler.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "blood/cell_flow.hpp"
 #include "blood/core_edge.hpp"
 #include "core/log.hpp"
 #include "core/units.hpp"
-
-#include <algorithm>
-#include <cmath>
 
 namespace corpuscle {
 
@@ -37,7 +39,10 @@ nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::js
 }  // namespace
 
 BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
-    : simulation_(simulation), settings_(*scene.blood), boundaries_(scene.boundaries), flow_(find_guided_flow(scene, simulation.fluid())) {
+    : simulation_(simulation),
+      settings_(*scene.blood),
+      boundaries_(scene.boundaries),
+      flow_(find_guided_flow(scene, simulation.fluid())) {
   if (flow_) frame_ = flow_->frame;
   if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
   bins_ = !frame_.guided() ? 0 : settings_.bins > 0 ? settings_.bins : default_bins(scene, *flow_, simulation.grid());
@@ -48,7 +53,7 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
   cell_totals_host_ = HostCopy(cell_totals_);
   cell_sums_.resize(cell_totals_.size());
   if (windows_ > 0) {
-    edge_ = Table<double>(uninitialised("corpuscle::blood::edge"), windows_, view_count(frame_));
+    edge_ = Table<double>(uninitialised("corpuscle::blood::edge"), windows_, view_count(frame_) + filled_columns);
     edge_host_ = HostCopy(edge_);
   }
 }
@@ -88,7 +93,8 @@ void BloodSampler::make_profile() {
     profile_.lengthening = Array<double>(uninitialised("corpuscle::blood::lengthening"), owned);
     find_directions(grid.views(), frame_, profile_);
   }
-  profile_parts_ = Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
+  profile_parts_ =
+      Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
   profile_parts_host_ = HostCopy(profile_parts_);
   profile_sums_.resize(bins * ProfileColumn::count);
   // The share of the whole that a bin is, of the grid's volume: exact for tubes, bent ones too, and between walls.
@@ -101,8 +107,10 @@ void BloodSampler::make_profile() {
 bool BloodSampler::due() const {
   const double now = simulation_.time(), before = now - simulation_.last_step_us(), every = settings_.sample_every_us;
   constexpr double rounding = 1e-9;
+  constexpr long seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
   if (now < settings_.from_us * (1 - rounding)) return false;
-  return every <= 0 || std::floor(now / every + rounding) > std::floor(before / every + rounding);
+  if (every <= 0) return simulation_.steps() % seldom == 0;
+  return std::floor(now / every + rounding) > std::floor(before / every + rounding);
 }
 
 /// Volumes and flows of the cells, of all ranks.
@@ -110,7 +118,8 @@ void BloodSampler::measure_cells() {
   const Membranes& membranes = *simulation_.membranes();
   const int cells = membranes.cells();
   if (const auto rows = static_cast<std::size_t>(cells) * sections; !cell_parts_.data() || cell_parts_.extent(0) < rows)
-    cell_parts_ = Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
+    cell_parts_ =
+        Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
   sum_cell_flow(membranes.surfaces(), cells, frame_, bins_, cell_parts_, cell_totals_);
   add_ranks(simulation_.grid().comm(), cell_totals_host_.read(), cell_sums_);
 }
@@ -118,7 +127,8 @@ void BloodSampler::measure_cells() {
 /// Volumes and velocities of the bins, of all ranks.
 void BloodSampler::measure_flow() {
   const int bins = std::max(bins_, 1);
-  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins, profile_parts_);
+  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins,
+              profile_parts_);
   const auto& parts = profile_parts_host_.read();
   for (int b = 0; b < bins; ++b)
     for (int q = 0; q < ProfileColumn::count; ++q) {
@@ -129,24 +139,13 @@ void BloodSampler::measure_flow() {
   simulation_.grid().comm().sum(profile_sums_.data(), static_cast<int>(profile_sums_.size()));
 }
 
-/// Between the wall and the outermost membrane in each window, seen from each side; the mean of all windows with a cell.
 void BloodSampler::measure_layer() {
-  const auto& set = simulation_.membranes()->surfaces();
-  find_core_edge(set, simulation_.membranes()->vertices(), frame_, windows_, edge_);
-  std::vector<double> edge(edge_.size());
+  const Membranes& membranes = *simulation_.membranes();
+  find_core_edge(membranes.surfaces(), membranes.views().triangles, frame_, windows_, edge_);
   const auto& host = edge_host_.read();
-  std::copy_n(host.data(), edge.size(), edge.begin());
+  std::vector<double> edge(host.data(), host.data() + edge_.size());
   simulation_.grid().comm().max(edge.data(), static_cast<int>(edge.size()));
-  double sum = 0;
-  long count = 0;
-  const int views = view_count(frame_);
-  for (std::size_t n = 0; n < edge.size(); ++n) {
-    if (edge[n] == nobody) continue;
-    const bool lower = !frame_.tube() && static_cast<int>(n) % views == 1;
-    sum += (lower ? 0 : frame_.width) - edge[n];
-    ++count;
-  }
-  last_.cell_free_layer_um = count > 0 ? sum / static_cast<double>(count) : unknown;
+  last_.cell_free_layer_um = cell_free_layer(frame_, windows_, edge.data());
 }
 
 /// Stress on the walls over that of plasma at the same shear rate.
@@ -162,12 +161,14 @@ double BloodSampler::wall_viscosity() {
     for (int m = 0; m < 3; ++m) velocity[end][m] = wall.velocity ? factor * (*wall.velocity)[m] : 0;
     if (grid.halo().neighbour(d, end) >= 0) continue;
     const auto force_on = fluid.skewed() ? wall_force<true> : wall_force<false>;
-    const auto side = force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
+    const auto side =
+        force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
     sums[2 * end] = side[0], sums[2 * end + 1] = side[1];
   }
   grid.comm().sum(sums, 4);
   const double rate = dot(velocity[1] - velocity[0], frame_.tangent) / frame_.width;
-  const double stress = 0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
+  const double stress =
+      0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
   return rate != 0 ? stress / (fluid.viscosity() * rate) : unknown;
 }
 
@@ -191,13 +192,15 @@ const BloodSample& BloodSampler::sample() {
   if (flow_ && flow_->sheared && frame_.guided()) last_.relative_viscosity = wall_viscosity();
   last_.cell_free_layer_um = unknown;
   if (windows_ > 0) measure_layer();
-  std::vector<double> values{last_.hematocrit, last_.mean_speed, last_.cell_speed, last_.discharge_hematocrit, last_.relative_viscosity,
-                             last_.cell_free_layer_um};
+  std::vector<double> values{last_.hematocrit,           last_.mean_speed,         last_.cell_speed,
+                             last_.discharge_hematocrit, last_.relative_viscosity, last_.cell_free_layer_um};
   for (int b = 0; b < bins_; ++b)
-    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) / bin_volume_[b]);
+    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) /
+                     bin_volume_[b]);
   for (int b = 0; b < bins_; ++b) {
     const double* sums = profile_sums_.data() + b * ProfileColumn::count;
-    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume] : unknown);
+    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume]
+                                                     : unknown);
   }
   means_.add(values);
   return last_;
@@ -249,6 +252,23 @@ nlohmann::json BloodSampler::report() const {
     put_with_error("relative_apparent_viscosity", "", means_.mean(viscosity), means_.error(viscosity));
   if (plasma_speed_ != 0) block["plasma_mean_speed_mm_per_s"] = plasma_speed_ / units::mm_per_s;
   put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
+  if (block.contains("cell_free_layer_um"))
+    block["cell_free_layer_is"] = fmt::format(
+        "between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where "
+        "there is no "
+        "cell along the flow there is no layer",
+        frame_.length / windows_, view_count(frame_));
+  bool steady = true, known = false;
+  for (const int q : {int(discharge), int(viscosity), int(layer)}) {
+    const double drift = means_.drift_over_chance(q);
+    constexpr double surely = 3;
+    known = known || std::isfinite(drift);
+    steady = steady && !(drift > surely);
+  }
+  block["steady"] = known ? nlohmann::json(steady) : nlohmann::json();
+  block["errors_are"] = fmt::format(
+      "standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
+      RunningMeans::least_blocks);
   return block;
 }
 

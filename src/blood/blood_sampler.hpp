@@ -1,12 +1,12 @@
 // [blood]: what blood people measure of many cells in a flow, as means over time with standard errors.
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include "blood/flow_profile.hpp"
 #include "blood/guided_flow.hpp"
 #include "blood/running_means.hpp"
 #include "coupling/flow_simulation.hpp"
-
-#include <nlohmann/json.hpp>
 
 namespace corpuscle {
 

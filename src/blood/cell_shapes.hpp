@@ -1,11 +1,11 @@
 // The shapes of cells in a flow, and how their membranes have turned: for the history.
 #pragma once
 
-#include "blood/cell_shape.hpp"
-#include "membrane/reference.hpp"
-
 #include <string>
 #include <vector>
+
+#include "blood/cell_shape.hpp"
+#include "membrane/reference.hpp"
 
 namespace corpuscle {
 

@@ -1,9 +1,9 @@
 #include "blood/guided_flow.hpp"
 
-#include "fluid/flow_balances.hpp"
-
 #include <algorithm>
 #include <cmath>
+
+#include "fluid/flow_balances.hpp"
 
 namespace corpuscle {
 
@@ -21,7 +21,9 @@ const BoundarySettings& side_of(const Case& scene, int number) {
                        [&](const BoundarySettings& b) { return static_cast<int>(b.side) == number; });
 }
 
-int entry_of(const Case& scene, int number) { return static_cast<int>(&side_of(scene, number) - scene.boundaries.data()); }
+int entry_of(const Case& scene, int number) {
+  return static_cast<int>(&side_of(scene, number) - scene.boundaries.data());
+}
 
 /// A unit vector across another.
 Vec3 any_across(const Vec3& a) {
@@ -120,7 +122,8 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
     walls += low + high;
     if (low && high) ++pairs, d = e;
   }
-  if (walls > 0 && (pairs != 1 || walls != 2)) return std::nullopt;  // ducts and boxes with a lid have no one direction across
+  if (walls > 0 && (pairs != 1 || walls != 2))
+    return std::nullopt;  // ducts and boxes with a lid have no one direction across
   GuidedFlow flow;
   FlowFrame& frame = flow.frame;
   const Triple &lower = scene.grid->lower_um, &upper = scene.grid->upper_um;
@@ -150,7 +153,8 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
     if (flow.driven && gradient > 0)
       flow.gradient = gradient;
     else if (!flow.sheared)
-      flow.no_viscosity = flow.driven ? "no pressure gradient is imposed" : "both moving walls and a pressure gradient drive the flow";
+      flow.no_viscosity =
+          flow.driven ? "no pressure gradient is imposed" : "both moving walls and a pressure gradient drive the flow";
   }
   complete(frame);
   return flow;
@@ -161,10 +165,13 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
 std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid) {
   if (!scene.grid || scene.boundaries.size() != 6) return std::nullopt;
   switch (scene.grid->generator) {
-    case Generator::box: return box_flow(scene, fluid);
+    case Generator::box:
+      return box_flow(scene, fluid);
     case Generator::straight_tube:
-    case Generator::swept_tube: return tube_flow(scene, fluid);
-    case Generator::file: break;
+    case Generator::swept_tube:
+      return tube_flow(scene, fluid);
+    case Generator::file:
+      break;
   }
   return std::nullopt;
 }
@@ -197,9 +204,11 @@ double plasma_speed(const Case& scene, const GuidedFlow& flow) {
   return dot(to_vec3(mean), flow.frame.tangent);
 }
 
-void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid, const Components<double>& stress) {
+void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
+                      const Components<double>& stress) {
   WallSides sides;
-  for (const auto& side : boundaries) sides.wall[static_cast<int>(side.side) / 2][static_cast<int>(side.side) % 2] = is_wall(side);
+  for (const auto& side : boundaries)
+    sides.wall[static_cast<int>(side.side) / 2][static_cast<int>(side.side) % 2] = is_wall(side);
   const auto find = fluid.skewed() ? wall_stress_field<true> : wall_stress_field<false>;
   find(fluid.grid().views(), fluid.coefficients(), sides, fluid.viscosity(), fluid.velocity(), stress);
 }

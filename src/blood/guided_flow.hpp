@@ -1,12 +1,12 @@
 // What a scene's flow is: along a tube, between two walls, or through a periodic box, and what plasma alone does there.
 #pragma once
 
+#include <optional>
+
 #include "blood/flow_frame.hpp"
 #include "blood/wall_stress.hpp"
 #include "fluid/fluid_solver.hpp"
 #include "input/case.hpp"
-
-#include <optional>
 
 namespace corpuscle {
 
@@ -23,12 +23,14 @@ struct GuidedFlow {
 /// Nothing where there is no direction of flow: in a box without walls or gradient, on grids from files.
 std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid);
 
-/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same grid of
-/// four cells along the flow, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank does
-/// it for itself. @pre flow.gradient is not 0
+/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same
+/// grid of four cells along the flow, so that its error is the same as that of the scene and leaves no trace in their
+/// ratio. Every rank does it for itself. @pre flow.gradient is not 0
 double plasma_speed(const Case& scene, const GuidedFlow& flow);
 
-/// Stress of the flow on the walls around this block, resting and moving ones, into `stress` [cell, 3] of owned cells, kPa.
-void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid, const Components<double>& stress);
+/// Stress of the flow on the walls around this block, resting and moving ones, into `stress` [cell, 3] of owned cells,
+/// kPa.
+void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
+                      const Components<double>& stress);
 
 }  // namespace corpuscle

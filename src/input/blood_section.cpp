@@ -8,7 +8,10 @@ BloodSettings read_blood(Section& s) {
   constexpr double least_um = 0.1;
   BloodSettings b;
   b.from_us = s.number("from_us", not_negative(), b.from_us);
-  b.sample_every_us = s.number("sample_every_us", not_negative(), b.sample_every_us);
+  if (s.node("sample_every_us"))
+    b.sample_every_us = s.number("sample_every_us", positive());
+  else
+    s.describe("sample_every_us", "a number above 0", "every tenth step");
   if (s.node("bins"))
     b.bins = s.integer("bins", least_bins, most_bins);
   else

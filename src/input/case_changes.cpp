@@ -43,7 +43,8 @@ bool ends_with(const std::string& text, const std::string& end) {
 
 /// Keys of a run that change nothing in what it computes.
 bool only_of_the_run(const std::string& key) {
-  return key == "title" || starts_with(key, "output.") || starts_with(key, "blood.") || key == "time.end_us" || key == "time.stop_before_outflow_um";
+  return key == "title" || starts_with(key, "output.") || starts_with(key, "blood.") || key == "time.end_us" ||
+         key == "time.stop_before_outflow_um";
 }
 
 bool is_geometry(const std::string& key) {

@@ -26,7 +26,8 @@ namespace {
 constexpr const char* lock_name = ".corpuscle.lock";
 constexpr const char* run_name = ".corpuscle.run";
 const std::vector<std::string> result_files = {"report.json", "history.csv", "fields.h5",    "fields.xdmf",
-                                               "cells.h5",    "cells.xdmf",  "checkpoint.h5"};
+                                               "cells.h5",    "cells.xdmf",  "checkpoint.h5", "blood.csv",
+                                               "blood.h5",    "cell_series.h5", "cell_series.xdmf"};
 
 std::string first_result(const fs::path& folder) {
   for (const auto& name : result_files)
@@ -65,13 +66,14 @@ void remove_results(const std::string& folder) {
     for (const char* unfinished : {".part", ".old"}) fs::remove(fs::path(folder) / (name + unfinished), ignored);
   }
   fs::remove(fs::path(folder) / run_name, ignored);
-  for (const char* series : {"fields", "cells"}) {
+  for (const char* series : {"fields", "cells", "cell_series"}) {
     const auto inner = fs::path(folder) / series;
     if (!fs::is_directory(inner, ignored)) continue;
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(inner)) {
       const auto name = entry.path().filename().string();
-      if (name.rfind("step_", 0) == 0 || name.rfind("grid.h5", 0) == 0 || name.rfind("mesh.h5", 0) == 0)
+      if (name.rfind("step_", 0) == 0 || name.rfind("grid.h5", 0) == 0 || name.rfind("mesh.h5", 0) == 0 ||
+          name.rfind("numbers.h5", 0) == 0)
         files.push_back(entry.path());
     }
     for (const auto& file : files) fs::remove(file, ignored);

@@ -17,16 +17,22 @@ fs::path write_case(const fs::path& folder, const std::string& name, bool sheare
   if (!sheared) out << "pressure_gradient_Pa_per_um = [-6, 0, -2]\n";
   for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"}) {
     const bool wall = side[0] == 'j', moves = wall && sheared;
-    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"" << (moves ? "moving_wall" : wall ? "wall" : "periodic") << "\"\n";
+    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \""
+        << (moves  ? "moving_wall"
+            : wall ? "wall"
+                   : "periodic")
+        << "\"\n";
     if (moves) out << "velocity_mm_per_s = [" << (side[2] == 'm' && side[3] == 'i' ? -4 : 4) << ", 0, 0]\n";
   }
-  out << "[[cell_types]]\nname = \"large\"\nshape = \"sphere\"\nradius_um = 0.75\nvertices = 60\nlaw = \"neo-hookean\"\n"
-         "[[cell_types]]\nname = \"small\"\nshape = \"sphere\"\nradius_um = 0.65\nvertices = 50\nlaw = \"neo-hookean\"\n";
+  out << "[[cell_types]]\nname = \"large\"\nshape = \"sphere\"\nradius_um = 0.75\nvertices = 60\nlaw = "
+         "\"neo-hookean\"\n"
+         "[[cell_types]]\nname = \"small\"\nshape = \"sphere\"\nradius_um = 0.65\nvertices = 50\nlaw = "
+         "\"neo-hookean\"\n";
   for (int n = 0; n < cells; ++n)
-    out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6) << ", "
-        << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
-  out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.1\n[blood]\nfrom_us = 20\n"
-         "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\n";
+    out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6)
+        << ", " << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
+  out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.1\n[blood]\nfrom_us = 20\nsample_every_us = 10\n"
+         "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\nhistory_every_us = 20\n";
   return folder / (name + ".toml");
 }
 
@@ -43,7 +49,8 @@ double largest_difference(const fs::path& a, const fs::path& b) {
     REQUIRE(x.size() == y.size());
     for (std::size_t n = 0; n < x.size(); ++n) {
       REQUIRE(x[n].empty() == y[n].empty());
-      if (!x[n].empty()) most = std::max(most, std::abs(std::stod(x[n]) - std::stod(y[n])) / (1e-12 + std::abs(std::stod(x[n]))));
+      if (!x[n].empty())
+        most = std::max(most, std::abs(std::stod(x[n]) - std::stod(y[n])) / (1e-12 + std::abs(std::stod(x[n]))));
     }
   }
   CHECK_FALSE(std::getline(second, two));
@@ -62,14 +69,16 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   CHECK(blood["samples"] == 7);  // at 20, 30, ... 80 us
   CHECK(blood["crossings"] == 0);
   const double share = blood["tube_hematocrit"];
-  CHECK(share == Approx((6 * std::pow(0.75, 3) + 12 * std::pow(0.65, 3)) * 4 * M_PI / 3 / (12 * 4 * 6)).epsilon(0.12));  // coarse meshes
+  CHECK(share == Approx((6 * std::pow(0.75, 3) + 12 * std::pow(0.65, 3)) * 4 * M_PI / 3 / (12 * 4 * 6))
+                     .epsilon(0.12));  // coarse meshes
   const double speed = blood["mean_speed_mm_per_s"], cells = blood["cell_speed_mm_per_s"];
   CHECK(cells / speed == Approx(1.5 * 0.75).epsilon(0.1));  // of a parabola, half way from the middle to the wall
   CHECK(blood["discharge_hematocrit"].get<double>() == Approx(share * cells / speed).epsilon(1e-12));
   CHECK(blood["relative_apparent_viscosity"].get<double>() > 1);
   CHECK(blood["relative_apparent_viscosity"].get<double>() < 1.3);
-  CHECK(blood["plasma_mean_speed_mm_per_s"].get<double>() == Approx(std::hypot(6, 2) * 16 / (12 * 1.1)).epsilon(0.04));  // 2 over the cells across, squared
-  CHECK(blood["relative_apparent_viscosity_error"].is_null());  // of seven samples none is told
+  CHECK(blood["plasma_mean_speed_mm_per_s"].get<double>() ==
+        Approx(std::hypot(6, 2) * 16 / (12 * 1.1)).epsilon(0.04));  // 2 over the cells across, squared
+  CHECK(blood["relative_apparent_viscosity_error"].is_null());      // of seven samples none is told
   CHECK(blood["cell_free_layer_um"].get<double>() == Approx(0.3).margin(0.1));
   CHECK(blood["cell_free_layer_um"].get<double>() > 0);
 #ifdef CORPUSCLE_HDF5
@@ -96,12 +105,26 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   // Of many cells each one's shape is with its other figures.
   CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/deformation").size() == 18);
   CHECK(data_set(folder / "one/cells.h5", "step_000000008/per_cell/tank_treading_deg").size() == 18);
+  // And at the history's times, in a series of its own.
+  const auto deformation = data_set(folder / "one/cell_series.h5", "step_000000006/deformation");
+  REQUIRE(deformation.size() == 18);
+  CHECK(deformation[4] > 0);
+  CHECK(data_set(folder / "one/cell_series.h5", "step_000000008/centroid_um") ==
+        data_set(folder / "one/cells.h5", "step_000000008/per_cell/centroid_um"));
+  const auto listed = contents(folder / "one/cell_series.xdmf");
+  CHECK_THAT(listed, Catch::Contains("CollectionType=\"Temporal\"") && Catch::Contains("Polyvertex") &&
+                         Catch::Contains("NodesPerElement=\"1\">\n     <DataItem Dimensions=\"18\"") &&
+                         Catch::Contains("deformation"));
 #ifdef CORPUSCLE_MPI
   for (int ranks : {2, 4}) {
     const std::string out = "on_" + std::to_string(ranks);
     succeed(folder, {"run", name, "--out", out}, {1, ranks});
     INFO(out);
-    CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") < 1e-8);  // round-off, grown over eight steps
+    CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") <
+          1e-8);  // round-off, grown over eight steps
+    const auto on_ranks = data_set(folder / out / "cell_series.h5", "step_000000006/deformation");
+    REQUIRE(on_ranks.size() == 18);
+    for (int n = 0; n < 18; ++n) CHECK(on_ranks[n] == Approx(deformation[n]).margin(1e-9));
   }
 #endif
   // Stopped at 40 us and gone on from there: the same bits.
@@ -110,9 +133,26 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   CHECK(contents(folder / "parts/blood.csv") == contents(folder / "one/blood.csv"));
   CHECK(report(folder / "parts")["blood"] == blood);
   for (const char* set : {"hematocrit", "velocity_mm_per_s"})
-    CHECK(data_set(folder / "parts/blood.h5", std::string("profile/") + set) == data_set(folder / "one/blood.h5", std::string("profile/") + set));
+    CHECK(data_set(folder / "parts/blood.h5", std::string("profile/") + set) ==
+          data_set(folder / "one/blood.h5", std::string("profile/") + set));
+#ifdef CORPUSCLE_MPI
+  succeed(folder, {"run", name, "--out", "parts_2", "--set", "time.end_us=40"}, {1, 1});
+  succeed(folder, {"run", name, "--out", "parts_2", "--restart", "parts_2/checkpoint.h5"}, {1, 2});
+  CHECK(largest_difference(folder / "one/blood.csv", folder / "parts_2/blood.csv") < 1e-8);
+  CHECK(report(folder / "parts_2")["blood"]["samples"] == 7);
+#endif
+  CHECK(data_set(folder / "parts/cell_series.h5", "step_000000006/deformation") == deformation);
+  CHECK(contents(folder / "parts/cell_series.xdmf") == listed);
+  // They are results: another run does not write among them unasked.
+  fs::remove(folder / "parts/report.json");
+  for (const char* file : {"history.csv", "cells.h5", "fields.h5", "cells.xdmf", "fields.xdmf", "checkpoint.h5"})
+    fs::copy(folder / "parts" / file, folder / file), fs::remove(folder / "parts" / file);
+  fail(folder, {"run", name, "--out", "parts"}, 2, {"blood.csv"}, {1, 1, "OMP_WAIT_POLICY=passive", false});
   // Other bins cannot go on from what was sampled; sampling begins anew, and says so.
-  const auto anew = succeed(folder, {"run", name, "--out", "anew", "--restart", "parts/checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"}, {1, 1});
+  const auto anew = succeed(
+      folder,
+      {"run", name, "--out", "anew", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"},
+      {1, 1});
   CHECK_THAT(anew.output, Catch::Contains("sampling begins anew"));
   CHECK(report(folder / "anew")["blood"]["samples"] == 2);
 #endif
@@ -121,7 +161,10 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
 TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is left out") {
   const auto folder = fresh_folder("viscometer");
   const std::string name = write_case(folder, "sheared", true, 2).string();
-  succeed(folder, {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.end_us=200", "--set", "output.every_us=200"}, {1, 1});
+  succeed(folder,
+          {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.end_us=200", "--set",
+           "output.every_us=200"},
+          {1, 1});
   const auto blood = report(folder / "run")["blood"];
   INFO(blood.dump(1));
   // 0.9 % of nearly round capsules: Einstein's 1 + 2.5 of it, which walls so near may double.
@@ -142,4 +185,59 @@ TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is 
   CHECK(lines.number(lines.lines.size() - 1, "inclination_deg") > 20);
   CHECK(lines.number(lines.lines.size() - 1, "inclination_deg") < 50);
   CHECK(lines.number(lines.lines.size() - 1, "membrane_angle_deg") < lines.number(0, "membrane_angle_deg"));
+}
+
+TEST_CASE("blood in tubes, straight and bent") {
+  const auto folder = fresh_folder("blood_tubes");
+  const auto write = [&](const std::string& name, const std::string& shape, const std::string& ends,
+                         const std::string& place) {
+    std::ofstream out(folder / name);
+    out << "[time]\nstep_us = 8\nend_us = 320\n[grid]\nnodes = [17, 17, 25]\ndiameter_um = 8\n"
+        << shape << "[fluid]\nconvection = false\nmomentum_tolerance = 1e-11\ndivergence_tolerance = 1e-12\n"
+        << ends;
+    for (const char* side : {"i_min", "i_max", "j_min", "j_max"})
+      out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"wall\"\n";
+    out << "[[cells]]\nshape = \"sphere\"\nradius_um = 2\nlaw = \"neo-hookean\"\nshear_modulus_uN_per_m = 15\nvertices "
+           "= 200\ncenter_um = "
+        << place
+        << "\n[coupling]\nscheme = \"force\"\n[blood]\nfrom_us = 100\nsample_every_us = 8\n[output]\nfields = "
+           "false\ncells = false\n";
+    return (folder / name).string();
+  };
+  const auto end = [](const char* side, const std::string& what) {
+    return "[[boundary]]\nside = \"" + std::string(side) + "\"\n" + what;
+  };
+  const std::string straight = write("straight.toml", "generator = \"straight_tube\"\nlength_um = 12\n",
+                                     "pressure_gradient_Pa_per_um = [0, 0, -2]\n" +
+                                         end("k_min", "type = \"periodic\"\n") + end("k_max", "type = \"periodic\"\n"),
+                                     "[0, 0, 5.5]");
+  succeed(folder, {"run", straight, "--out", "straight"}, {1, 1});
+  const auto tube = report(folder / "straight")["blood"];
+  INFO(tube.dump(1));
+  // A stiff ball of half the tube's width on its axis: by Faxen's law, 2 (1 - 2/3 (a/R)^2) times the mean speed, of one
+  // so small that the walls do not feel it, in an endless tube.
+  const double share = tube["tube_hematocrit"], viscosity = tube["relative_apparent_viscosity"];
+  CHECK(share == Approx(4.0 / 3 * 8 / (16 * 12)).epsilon(0.03));
+  CHECK(tube["cell_speed_mm_per_s"].get<double>() / tube["mean_speed_mm_per_s"].get<double>() ==
+        Approx(5.0 / 3).epsilon(0.03));
+  CHECK(viscosity > 1.005);
+  CHECK(viscosity < 1.15);
+  CHECK(tube["relative_apparent_viscosity_error"].get<double>() < 0.05);
+  CHECK(tube["cell_free_layer_um"].get<double>() == Approx(2).margin(0.6));
+#ifdef CORPUSCLE_MPI
+  succeed(folder, {"run", straight, "--out", "straight_2"}, {1, 2});
+  CHECK(largest_difference(folder / "straight/blood.csv", folder / "straight_2/blood.csv") < 1e-7);
+#endif
+  // A quarter of a circle of 20 um around (20, 0, 0).
+  const std::string bent =
+      write("bent.toml", "generator = \"swept_tube\"\ncenterline = \"arc\"\narc_radius_um = 20\narc_angle_deg = 90\n",
+            end("k_min", "type = \"velocity_inlet\"\nvelocity_mm_per_s = 4\nprofile = \"parabolic\"\n") +
+                end("k_max", "type = \"outflow\"\n"),
+            "[4.7, 0, 12.9]");
+  succeed(folder, {"run", bent, "--out", "bent", "--set", "coupling.slip=false"}, {1, 1});
+  const auto curve = report(folder / "bent")["blood"];
+  INFO(curve.dump(1));
+  CHECK(curve["mean_speed_mm_per_s"].get<double>() == Approx(4).epsilon(0.01));
+  CHECK(curve["cell_speed_mm_per_s"].get<double>() / 4 == Approx(5.0 / 3).epsilon(0.06));
+  CHECK_THAT(curve["left_out"]["relative_apparent_viscosity"].get<std::string>(), Catch::Contains("bent tube"));
 }

@@ -26,20 +26,35 @@ RunningMeans sampled(double memory, int count, unsigned seed) {
 
 TEST_CASE("standard errors are those of correlated samples", "[blood]") {
   for (const double memory : {0.0, 0.8, 0.95}) {
-    // Over many series the mean's spread is what the error says, not the smaller one of samples that know nothing of each other.
+    // Over many series the mean's spread is what the error says, not the smaller one of samples that know nothing of
+    // each other.
     constexpr int series = 40, count = 16000;
-    double spread = 0, error = 0;
+    double spread = 0, error = 0, chance = 0;
     for (int s = 0; s < series; ++s) {
       const auto means = sampled(memory, count, 100 + s);
       spread += std::pow(means.mean(0) - 10, 2) / series;
       error += means.error(0) / series;
+      chance += std::pow(means.drift_over_chance(0), 2) / series;
     }
     const double exact = std::sqrt((1 + memory) / (1 - memory) / count);
     INFO("memory " << memory << ": exact " << exact << ", told " << error << ", seen " << std::sqrt(spread));
     CHECK(error > 0.9 * exact);
-    CHECK(error < 1.5 * exact);  // the largest of several estimates: a little high
+    CHECK(error < 1.5 * exact);                             // the largest of several estimates: a little high
+    CHECK(std::sqrt(chance) == Approx(0.85).margin(0.35));  // one, and less as errors are told a little high
     CHECK(std::sqrt(spread) == Approx(exact).epsilon(0.35));
   }
+}
+
+TEST_CASE("a trend is told from chance", "[blood]") {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  RunningMeans means(2);
+  constexpr int count = 400;
+  for (int n = 0; n < count; ++n) means.add({5 + 0.01 * n, 5 + 0.01 * n + normal(random)});
+  CHECK(means.drift(0) == Approx(0.01 * (count - 1)).epsilon(1e-12));
+  CHECK(means.drift_over_chance(0) > 3);
+  CHECK(means.drift(1) == Approx(0.01 * (count - 1)).epsilon(0.1));
+  CHECK(means.drift_over_chance(1) > 3);
 }
 
 TEST_CASE("means know what they do not know, and go on from a state", "[blood]") {

@@ -289,7 +289,7 @@ TEST_CASE("cells and bodies are checked") {
   REQUIRE(blood("sample_every_us = 10\nbins = 12\nlayer_window_um = 0.5") == "accepted");
   require_parts(blood("bins = 1"), {":15: blood.bins = 1", "from 2 to 32"});
   require_parts(blood("bins = 33"), {":15: blood.bins = 33", "from 2 to 32"});
-  require_parts(blood("sample_every_us = -1"), {":15: blood.sample_every_us = -1", "0"});
+  require_parts(blood("sample_every_us = 0"), {":15: blood.sample_every_us = 0", "above 0"});
   require_parts(blood("layer_window_um = 0"), {":15: blood.layer_window_um = 0", "from 0.1"});
   require_parts(blood("from_us = 1e9"), {":15: blood.from_us", "time.end_us", "begin earlier"});
   require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});

@@ -211,7 +211,7 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "contact.range_um=0.25"}, 3);
   }
   SECTION("straight tube, blood measured") {
-    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "blood.from_us=0"});
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "blood.sample_every_us=1"});
   }
   SECTION("straight tube with two cells") { check_flow("straight_tube", {tube}, 10); }
   SECTION("straight tube, least of everything") {

@@ -93,7 +93,7 @@ def check_plot():
 
         blood = pathlib.Path(folder) / "blood"
         words = ["run", str(ROOT / "cases/capsule_shear.toml"), "--out", str(blood)]
-        for setting in ("grid.nodes=[17,17,17]", "time.end_us=400", "cells.0.vertices=200", "blood.from_us=200", "output.fields=false"):
+        for setting in ("grid.nodes=[17,17,17]", "time.end_us=400", "cells.0.vertices=200", "blood.from_us=200", "blood.sample_every_us=100", "output.fields=false"):
             words += ["--set", setting]
         check(start([os.environ["CORPUSCLE"], *words]).returncode == 0, "the run with [blood] failed")
         check(start([*plot, str(blood)]).returncode == 0 and (blood / "blood.png").exists(), "samples of blood cannot be drawn")
