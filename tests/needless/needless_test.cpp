@@ -31,6 +31,7 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
      {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
     {"contact", {"corpuscle::contact::"}},
+    {"packing", {"corpuscle::contact::least_wall_gap", "corpuscle::transfer::scale_forces"}},
     {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
                   "corpuscle::cells::measure_boxes"}},
     {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
