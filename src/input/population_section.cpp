@@ -43,7 +43,7 @@ PopulationSettings read_population(Section& s, const std::vector<CellTypeSetting
   PopulationSettings p;
   if (types.empty()) {
     if (!s.recording()) s.fail("type", "the case has no [[cell_types]]: add one, and name it here");
-    s.describe("type", "the name of one of [[cell_types]]", "");
+    s.require("type", "the name of one of [[cell_types]]");
   } else {
     p.type = read_type(s, types);
   }
