@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "cells/rank_blocks.hpp"
 #include "held_surface.hpp"
 #include "program.hpp"
 #include "transfer/delta.hpp"
@@ -126,8 +127,11 @@ void plates(char** words) {
   // Points on x + m y = c: one period of y, and m of x.
   const int per_line = 4 * static_cast<int>(std::lround(length * std::sqrt(1.0 + m * m) / std::min(hx, hy))), lines = 32;
   const int count = 2 * per_line * lines;
-  Components<double> x("corpuscle::plates::x", count, 3), force("corpuscle::plates::force", count, 3),
-      v("corpuscle::plates::v", count, 3);
+  Grid grid(Comm(), box(cells, length), {true, true, true});
+  const auto shifts = period_shifts(grid);
+  const int copies = static_cast<int>(shifts.size());  // of every point, what it is itself first
+  Components<double> x("corpuscle::plates::x", copies * count, 3), force("corpuscle::plates::force", copies * count, 3),
+      v("corpuscle::plates::v", copies * count, 3);
   const auto xh = Kokkos::create_mirror_view(x), fh = Kokkos::create_mirror_view(force);
   const double plate_area = length * length * std::sqrt(1.0 + m * m);
   for (int plate = 0, i = 0; plate < 2; ++plate)
@@ -136,16 +140,17 @@ void plates(char** words) {
         const double y = length * (s + 0.3) / per_line, c = offset * hx + 0.5 * plate * length;
         double at = c - m * y;
         at -= std::floor(at / length + 0.5) * length;
-        store(xh, i, Vec3{at, y - 0.5 * length, length * ((l + 0.4) / lines - 0.5)});
-        store(fh, i, ((plate == 0 ? 1 : -1) * plate_area / (per_line * lines)) * along);
+        for (int copy = 0; copy < copies; ++copy) {
+          store(xh, copy * count + i, Vec3{at, y - 0.5 * length, length * ((l + 0.4) / lines - 0.5)} + shifts[copy]);
+          store(fh, copy * count + i, ((plate == 0 ? 1 : -1) * plate_area / (per_line * lines)) * along);
+        }
       }
   Kokkos::deep_copy(x, xh);
   Kokkos::deep_copy(force, fh);
-  Grid grid(Comm(), box(cells, length), {true, true, true});
   const auto boundaries = all_sides(Type::periodic);
   FluidSolver fluid(grid, stokes(), boundaries);
   fluid.raise_reference_speed(1e-2);
-  Transfer transfer(grid, boundaries, kernel_of(words[0]), count);
+  Transfer transfer(grid, boundaries, kernel_of(words[0]), copies * count);
   fluid.set_face_force(transfer.faces());
   transfer.place(x);
   transfer.spread(force);
@@ -156,7 +161,7 @@ void plates(char** words) {
   transfer.interpolate(fluid.flux(), fluid.velocity(), nullptr, v);
   const auto vh = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), v);
   double difference = 0;
-  for (int i = 0; i < count; ++i) difference += (i < count / 2 ? 2.0 : -2.0) / count * dot(load(vh, i), along);
+  for (int i = 0; i < copies * count; ++i) difference += (i % count < count / 2 ? 2.0 : -2.0) / count * dot(load(vh, i), along);
   // Half of the force goes to either side; each plate lags behind by c h f / mu.
   const double distance = 0.5 * length / std::sqrt(1.0 + m * m), deficit = 0.5 * (0.5 * distance - difference);
   const double h = std::sqrt(std::pow(hx * normal.x, 2) + std::pow(hy * normal.y, 2));

@@ -10,6 +10,7 @@
 #include "coupling/surface_checks.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "parallel/agree.hpp"
+#include "transfer/face_loss.hpp"
 #include "transfer/vertex_forces.hpp"
 
 namespace corpuscle {
@@ -348,8 +349,9 @@ SlipViews ForceCoupling::slip_of_membranes() const {
 }
 
 double ForceCoupling::unresolved_dissipation() {
-  if (!scene_.coupling->slip) return 0;
-  return fluid_.grid().comm().sum(slip_power(transfer_->block(), slip_of_membranes(), transfer_->views()));
+  double loss = face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
+  if (scene_.coupling->slip) loss += slip_power(transfer_->block(), slip_of_membranes(), transfer_->views());
+  return fluid_.grid().comm().sum(loss);
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {

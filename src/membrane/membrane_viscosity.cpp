@@ -13,20 +13,21 @@ namespace {
 
 auto label(const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); }
 
-std::size_t scratch_numbers(const MembraneViews& m) {
-  return 9 * static_cast<std::size_t>(m.triangles) + 22 * static_cast<std::size_t>(m.vertices);
+std::size_t scratch_numbers(const MembraneViews& m, bool drifting) {
+  return 9 * static_cast<std::size_t>(m.triangles) + (drifting ? 22 : 19) * static_cast<std::size_t>(m.vertices);
 }
 
 }  // namespace
 
 void MembraneViscosity::make_room(const MembraneViews& m) {
-  const std::size_t numbers = scratch_numbers(m);
+  const bool drifting = given_.data();
+  const std::size_t numbers = scratch_numbers(m, drifting);
   if (!scratch_.data() || scratch_.extent(0) < numbers) {
     scratch_ = Array<double>();  // free before taking more
-    scratch_ = Array<double>(label("viscous_scratch"), numbers + (given_.data() ? numbers / 16 : 0));
+    scratch_ = Array<double>(label("viscous_scratch"), numbers + (drifting ? numbers / 16 : 0));
   }
   divide_scratch(m);
-  if (given_.data()) return;
+  if (drifting) return;
   views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
 }
@@ -42,8 +43,9 @@ void MembraneViscosity::divide_scratch(const MembraneViews& m) {
   views_.along = Table<double>(take(3 * entries), entries, 3);
   views_.diagonal = Array<double>(take(vertices), vertices);
   views_.block = Table<double>(take(6 * vertices), vertices, 6);
-  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image, &direction_})
+  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image})
     *vectors = Components<double>(take(3 * vertices), vertices, 3);
+  if (given_.data()) direction_ = Components<double>(take(3 * vertices), vertices, 3);
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,

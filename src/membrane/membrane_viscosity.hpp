@@ -47,7 +47,7 @@ class MembraneViscosity {
   bool tangential_;
   Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
   Array<double> scratch_;
-  Components<double> direction_;  // [vertex, 3] of the solver of q
+  Components<double> direction_;  // [vertex, 3] of the solver of q; only with hold()
   ViscosityViews views_;
 };
 

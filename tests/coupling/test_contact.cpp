@@ -50,7 +50,7 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
   struct Setting {
     double gap, push, step, end, balance;
   };
-  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.04});
+  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.01});
   Timers timers;
   FlowSimulation simulation(Comm(), pressed_cells(s.gap, s.push, s.step, s.end), timers);
   EnergyBalance energy(simulation);
@@ -71,7 +71,7 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
                      contact.crossings, contact.lists, *energy.imbalance(), energy.largest_fJ()));
   CHECK(contact.crossings == 0);
   CHECK(contact.smallest_gap > 0);
-  CHECK(contact.smallest_gap < s.gap + 0.045);  // the first cell is 2.56 um thick
+  CHECK(contact.smallest_gap < s.gap + 0.05);  // the first cell is 2.56 um thick; the load is borne 0.2 um apart
   for (const auto& cell : cells) {
     CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-4));
     CHECK(cell.area_um2 == Approx(cell.rest_area_um2).epsilon(0.03));
