@@ -108,6 +108,22 @@ inline void gaps_to_others(const SurfaceSet& surface, const ContactLists& lists,
       });
 }
 
+/// um to the own body, of all vertices; 1e30 where nothing is within reach.
+inline double least_own_gap(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts) {
+  const SurfaceSet s = surface;
+  const ContactLists in = lists;
+  const ContactViews c = contacts;
+  double least = 1e30;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::least_own_gap", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, double& sum) {
+        for (int g = in.first_group(v); g < in.first_group(v + 1); ++g)
+          if (c.item(g) >= 0 && same_body(s, v, c.item(g))) sum = smaller(sum, c.gap(g));
+      },
+      Smallest(least));
+  return least;
+}
+
 inline double least_of(const Array<double>& gap) {
   double least = 1e30;
   Kokkos::parallel_reduce(

@@ -32,9 +32,9 @@ KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p
   return wall;
 }
 
-/// The nearest of the walls within `reach` of a marker.
+/// The nearest of the walls within `reach` of a point that is at a marker or not far from it.
 KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSides& walls, const double (&eta)[3],
-                                            double reach) {
+                                            const Vec3& p, double reach) {
   double xi[3];
   for (int d = 0; d < 3; ++d) {  // from walls half a cell away to walls at nodes of their own
     const double last = lattice.index.n[d] - 1;
@@ -42,10 +42,6 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
     if (lattice.boundary_below[d] && eta[d] < 0) xi[d] = 2 * eta[d];
     if (lattice.boundary_above[d] && eta[d] > last) xi[d] = last + 2 * (eta[d] - last);
   }
-  LatticePoint q;
-  lattice.set(q, xi);
-  Vec3 p, tangent[3];
-  lattice.map(q, p, tangent);
   WallGap nearest;
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {
@@ -56,9 +52,12 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
   return nearest;
 }
 
-/// um from any of the sides, within `reach`, of the markers at home; 1e30 where none is so near.
-inline double least_wall_gap(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides, double reach) {
+/// um from any of the sides, within `reach`, of the vertices [vertex, 3] whose markers are at home; 1e30 where none is so near.
+/// Vertices may have moved on since the markers were placed, by less than walls bend.
+inline double least_wall_gap(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
+                             const Components<double>& vertices, double reach) {
   const Lattice lattice = grid_lattice;
+  const auto x = vertices;
   const MarkerViews m = markers;
   const WallSides walls = wall_sides;
   double least = 1e30;
@@ -67,30 +66,51 @@ inline double least_wall_gap(const Lattice& grid_lattice, const MarkerViews& mar
       KOKKOS_LAMBDA(int marker, double& sum) {
         if (!m.home(marker)) return;
         const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        sum = smaller(sum, nearest_wall(lattice, walls, eta, reach).gap);
+        sum = smaller(sum, nearest_wall(lattice, walls, eta, load(x, m.vertex(marker)), reach).gap);
       },
       Smallest(least));
   return least;
 }
 
-/// load [vertex, 4] = the force of the walls on the vertices at home, nN, and their energy, fJ; zero elsewhere. Areas
-/// at rest.
-inline void wall_forces(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
-                        const ContactLaw& contact_law, const Array<double>& rest_area, const Components<double>& load) {
+/// fJ, of the walls' repulsion, at vertices as above.
+inline double wall_energy(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
+                          const ContactLaw& contact_law, const Array<double>& rest_area, const Components<double>& vertices) {
   const Lattice lattice = grid_lattice;
   const MarkerViews m = markers;
   const WallSides walls = wall_sides;
   const ContactLaw law = contact_law;
-  Kokkos::deep_copy(Exec(), load, 0.0);
+  const auto x = vertices;
+  double energy = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::wall_energy", Policy(0, m.count),
+      KOKKOS_LAMBDA(int marker, double& sum) {
+        if (!m.home(marker)) return;
+        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const int v = m.vertex(marker);
+        const WallGap wall = nearest_wall(lattice, walls, eta, load(x, v), law.range);
+        if (wall.gap < law.range) sum += rest_area(v) * law.repulsion_energy(wall.gap);
+      },
+      energy);
+  return energy;
+}
+
+/// force [vertex, 3] = that of the walls on the vertices at home, nN; zero elsewhere. Areas at rest.
+inline void wall_forces(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
+                        const ContactLaw& contact_law, const Array<double>& rest_area, const Components<double>& vertices,
+                        const Components<double>& force) {
+  const Lattice lattice = grid_lattice;
+  const MarkerViews m = markers;
+  const WallSides walls = wall_sides;
+  const ContactLaw law = contact_law;
+  const auto x = vertices;
+  Kokkos::deep_copy(Exec(), force, 0.0);
   Kokkos::parallel_for(
       "corpuscle::contact::wall_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         if (!m.home(marker)) return;
         const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        const WallGap wall = nearest_wall(lattice, walls, eta, law.range);
-        if (wall.gap >= law.range) return;
         const int v = m.vertex(marker);
-        store(load, v, (rest_area(v) * law.repulsion(wall.gap)) * wall.inward);
-        load(v, 3) = rest_area(v) * law.repulsion_energy(wall.gap);
+        const WallGap wall = nearest_wall(lattice, walls, eta, load(x, v), law.range);
+        if (wall.gap < law.range) store(force, v, (rest_area(v) * law.repulsion(wall.gap)) * wall.inward);
       });
 }
 

@@ -32,6 +32,10 @@ class Elasticity {
   }
 
   virtual void fill_rows(const MembraneViews& m, const Table<double>& table) const = 0;
+
+  /// [vertex] how many times as fast as at rest the membrane answers tangential forces per area there, about and at most.
+  /// After membrane_forces().
+  virtual void measure_stiffening(const MembraneViews& m, const Array<double>& stiffening) const = 0;
 };
 
 /// One law for the cells that have it.
@@ -46,6 +50,9 @@ class ElasticityOf final : public Elasticity {
   }
   void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
     corpuscle::measure_cells(m, laws_, cells_, table);
+  }
+  void measure_stiffening(const MembraneViews& m, const Array<double>& stiffening) const override {
+    corpuscle::measure_stiffening(m, laws_, cells_, stiffening);
   }
 
  private:
@@ -63,6 +70,9 @@ class MixedElasticity final : public Elasticity {
   }
   void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
     for (const auto& part : parts_) part->fill_rows(m, table);
+  }
+  void measure_stiffening(const MembraneViews& m, const Array<double>& stiffening) const override {
+    for (const auto& part : parts_) part->measure_stiffening(m, stiffening);
   }
 
  private:

@@ -48,7 +48,10 @@ void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Ce
         const int shift = m.type_first_triangle(type) - first;
         const CellLaw law = m.law(type);
         const Law in_plane = laws(type);
-        const GlobalLoads loads = global_loads(section_total(m.totals, cell, 0), section_total(m.totals, cell, 1), law);
+        const double cell_area = section_total(m.totals, cell, 0);
+        const GlobalLoads loads = global_loads(cell_area, section_total(m.totals, cell, 1), law);
+        if ((Law::holds_area || law.area > 0) && !(std::fabs(cell_area / law.rest_area - 1) <= m.most_area))
+          Kokkos::single(Kokkos::PerTeam(team), [&]() { Kokkos::atomic_fetch_max(&m.status(0), cell + 1); });
         Kokkos::parallel_for(section_range(team, first, surface.first_triangle(cell + 1), section), [&](int t) {
           TriangleState state;
           for (int k = 0; k < 3; ++k) {
@@ -63,6 +66,31 @@ void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Ce
             for (int d = 0; d < 3; ++d) m.corner_force(t, 3 * k + d) = force[k][d];
           }
           if (!(strain < Law::limit)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
+        });
+      });
+}
+
+/// See Elasticity::measure_stiffening().
+template <class Law, class Cells>
+void measure_stiffening(const MembraneViews& m, const Array<Law>& laws, const Cells& cells, const Array<double>& stiffening) {
+  const auto x = m.surface.x;
+  for_sections_of(
+      "corpuscle::membrane::stiffening", cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const SurfaceSet& s = m.surface;
+        const int type = m.type(cell), shift = m.type_first_triangle(type) - s.first_triangle(cell);
+        const Law in_plane = laws(type);
+        Kokkos::parallel_for(section_range(team, s.first_vertex(cell), s.first_vertex(cell + 1), section), [&](int i) {
+          double most = 0;
+          for (int r = s.ring_start(i); r < s.ring_start(i + 1); ++r) {
+            const int t = s.ring_triangle(r);
+            Vec3 corner[3];
+            for (int k = 0; k < 3; ++k) corner[k] = load(x, s.triangle(t, k));
+            const double area = m.triangle_geometry(t, 3);
+            const TriangleRest rest = m.rest(t + shift);
+            const double own = in_plane.stiffening(triangle_shape(corner, load(m.triangle_geometry, t), area), rest) * rest.area / area;
+            most = own > most ? own : most;
+          }
+          stiffening(i) = most;
         });
       });
 }

@@ -11,6 +11,7 @@ namespace corpuscle {
 /// its cells; a cell itself is only positions and velocities.
 struct MembraneViews {
   int cells = 0, vertices = 0, triangles = 0;  // totals over all cells
+  double most_area = 1e300;                    // share by which the area of a membrane that holds it may change
   SurfaceSet surface;                          // shared with the fluid; the cells are its first bodies
 
   Array<int> type;                 // [cell]

@@ -15,6 +15,11 @@ struct NeoHookeanSheet {
     const double g = 0.5 * shear_modulus, inverse = 1 / ratio;
     return {g * (trace + inverse * inverse - 3), g, -2 * g * inverse * inverse * inverse};
   }
+  /// Of W's second derivatives by a and by b, the sum over that at rest.
+  KOKKOS_INLINE_FUNCTION double stiffening(double trace, double ratio) const {
+    const double square = ratio * ratio;
+    return 0.125 * (2 + 3 * trace / (square * square));
+  }
 };
 
 /// The law "neo-hookean".

@@ -18,6 +18,10 @@ struct SkalakSheet {
     return {0.25 * g * (i1 * i1 + 2 * (i1 - i2) + area_hardening * i2 * i2), 0.5 * g * (i1 + 1),
             g * ratio * (area_hardening * i2 - 1)};
   }
+  /// Of W's second derivatives by a and by b, the sum over that at rest.
+  KOKKOS_INLINE_FUNCTION double stiffening(double trace, double ratio) const {
+    return (3 * trace - 2 + area_hardening * trace * (3 * ratio * ratio - 1)) / (4 * (1 + area_hardening));
+  }
 };
 
 /// The law "skalak".

@@ -15,6 +15,8 @@ struct WlcPowSpring {
 
   KOKKOS_INLINE_FUNCTION double force(double length, double rest_length) const;
   KOKKOS_INLINE_FUNCTION double energy(double length, double rest_length) const;
+  /// The force's slope over that at rest.
+  KOKKOS_INLINE_FUNCTION double stiffening(double length, double rest_length) const;
   /// Length over l_m.
   KOKKOS_INLINE_FUNCTION static double strain(double length, double rest_length) { return length / rest_length * x0; }
 };
@@ -31,6 +33,16 @@ KOKKOS_INLINE_FUNCTION double WlcPowSpring::force(double length, double rest_len
   const double ratio = length / rest_length;
   const double x = ratio * x0 < limit ? ratio * x0 : limit;
   return stiffness * rest_length * (wlc_shape(x) - wlc_shape(x0) / (ratio * ratio));
+}
+
+/// The slope of force() over the stiffness, by the ratio of the length to that at rest.
+KOKKOS_INLINE_FUNCTION constexpr double link_slope(double ratio) {
+  const double x = ratio * WlcPowSpring::x0 < WlcPowSpring::limit ? ratio * WlcPowSpring::x0 : WlcPowSpring::limit;
+  return WlcPowSpring::x0 * (0.5 / ((1 - x) * (1 - x) * (1 - x)) + 1) + 2 * wlc_shape(WlcPowSpring::x0) / (ratio * ratio * ratio);
+}
+
+KOKKOS_INLINE_FUNCTION double WlcPowSpring::stiffening(double length, double rest_length) const {
+  return link_slope(length / rest_length) / link_slope(1);
 }
 
 /// U_WLC + U_POW of the link, fJ (Equations 5 and 6 with m = 2).

@@ -8,10 +8,12 @@ namespace corpuscle {
 
 /// Each triangle has half of each of its sides' springs; the other half comes from the triangle across.
 /// @tparam Spring  the constants of one cell type, with force(length, rest_length) along the link, nN, positive where it
-///                 pulls; energy(length, rest_length), fJ; strain(length, rest_length); and limit of that
+///                 pulls; energy(length, rest_length), fJ; strain(length, rest_length); stiffening(length, rest_length); and
+///                 limit of the strain
 template <class Spring>
 struct SpringNetwork {
   static constexpr double limit = Spring::limit;
+  static constexpr bool holds_area = true;
   Spring spring;
 
   KOKKOS_INLINE_FUNCTION double strain(const TriangleShape& s, const TriangleRest& rest) const {
@@ -30,6 +32,12 @@ struct SpringNetwork {
       force[(k + 2) % 3] -= pull;
     }
     return strain(s, rest);
+  }
+
+  KOKKOS_INLINE_FUNCTION double stiffening(const TriangleShape& s, const TriangleRest& rest) const {
+    double most = 0;
+    for (int k = 0; k < 3; ++k) most = larger(most, spring.stiffening(s.length[k], rest.length[k]));
+    return most;
   }
 
   KOKKOS_INLINE_FUNCTION double energy(const TriangleShape& s, const TriangleRest& rest) const {

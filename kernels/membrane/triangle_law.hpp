@@ -15,10 +15,12 @@ struct EnergyDensity {
 
 /// a^2 + b^2 is a sum over the sides of the cotangent of the angle across, at rest, times the length squared, over twice
 /// the area at rest (Pinkall & Polthier 1993: the Dirichlet energy of a linear map).
-/// @tparam Energy  the constants of one cell type, with density(trace, ratio), and limit of the larger stretch
+/// @tparam Energy  the constants of one cell type, with density(trace, ratio), stiffening(trace, ratio), and limit of the
+///                 larger stretch
 template <class Energy>
 struct TriangleLaw {
   static constexpr double limit = Energy::limit;
+  static constexpr bool holds_area = false;
   Energy material;
 
   /// Coefficients of the squared lengths in the trace, 1/um2.
@@ -59,6 +61,12 @@ struct TriangleLaw {
       force[k] -= (0.5 * w.by_ratio) * cross(s.normal, s.side[k]);
     }
     return largest_stretch(i1, ratio);
+  }
+
+  KOKKOS_INLINE_FUNCTION double stiffening(const TriangleShape& s, const TriangleRest& rest) const {
+    double weight[3];
+    weights(rest, weight);
+    return material.stiffening(trace(s, weight), s.area / rest.area);
   }
 
   KOKKOS_INLINE_FUNCTION double energy(const TriangleShape& s, const TriangleRest& rest) const {

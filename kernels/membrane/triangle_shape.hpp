@@ -6,7 +6,9 @@
 //   double energy(const TriangleShape&, const TriangleRest&) const   fJ, over all triangles the membrane's;
 //   double strain(const TriangleShape&, const TriangleRest&) const   how far the triangle is strained: at `limit` and
 //     beyond, where the law holds no more, the step is refused. A shape that is not a number gives 1e300;
-//   static constexpr double limit.
+//   double stiffening(const TriangleShape&, const TriangleRest&) const   how many times as stiff it is as at rest, about and
+//     at most, in the direction in which it is stiffest;
+//   static constexpr double limit, and bool holds_area: whether the law alone keeps a membrane's area about what it is.
 // Springs of any kind are SpringNetwork<Spring> (spring_network.hpp); a law of the triangle as a whole goes by its two
 // invariants (triangle_law.hpp). laws.hpp lists the laws that a scene can choose.
 #pragma once

@@ -35,18 +35,11 @@ inline double power_of_pushes(int count, const Array<int>& vertex_body, const Ta
   return power;
 }
 
-/// sum += the first three of four columns.
-inline void add_first_three(int count, const Components<double>& four, const Components<double>& sum) {
+/// sum += more.
+inline void add_forces(int count, const Components<double>& more, const Components<double>& sum) {
   Kokkos::parallel_for(
-      "corpuscle::transfer::add_first_three", Policy(0, count),
-      KOKKOS_LAMBDA(int i) { store(sum, i, load(sum, i) + load(four, i)); });
-}
-
-inline double sum_of_fourth(int count, const Components<double>& four) {
-  double total = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::transfer::sum_of_fourth", Policy(0, count), KOKKOS_LAMBDA(int i, double& sum) { sum += four(i, 3); }, total);
-  return total;
+      "corpuscle::transfer::add_forces", Policy(0, count),
+      KOKKOS_LAMBDA(int i) { store(sum, i, load(sum, i) + load(more, i)); });
 }
 
 /// Sum of force . velocity, nW.

@@ -33,7 +33,7 @@ CoarserRun doubled_spacing(const Case& scene) {
     if (nodes[d] < scene.grid->nodes[d]) ratio = std::min(ratio, double(cells) / (nodes[d] - 1));
   }
   if (nodes == scene.grid->nodes) refuse("spacing", "the grid has no more than the 4 nodes that are needed");
-  CoarserRun run{"spacing", ratio, {}};
+  CoarserRun run{"spacing", ratio, {}, {}};
   run.overrides.push_back(fmt::format("grid.nodes=[{},{},{}]", nodes[0], nodes[1], nodes[2]));
   return run;
 }
@@ -45,16 +45,17 @@ CoarserRun longer_step(const Case& scene) {
   long ratio = 2;
   while (ratio <= steps && steps % ratio != 0) ++ratio;
   if (ratio > steps) refuse("step", "the run is a single step");
-  CoarserRun run{"step", double(ratio), {}};
-  run.overrides.push_back(fmt::format("time.step_us={:.15g}", scene.time.step_us * ratio));
-  if (scene.time.first_step_us > 0)
-    run.overrides.push_back(fmt::format("time.first_step_us={:.15g}", scene.time.first_step_us * ratio));
-  return run;
+  const auto steps_times = [&](double factor) {
+    std::vector<std::string> overrides{fmt::format("time.step_us={:.15g}", scene.time.step_us * factor)};
+    if (scene.time.first_step_us > 0) overrides.push_back(fmt::format("time.first_step_us={:.15g}", scene.time.first_step_us * factor));
+    return overrides;
+  };
+  return {"step", double(ratio), steps_times(static_cast<double>(ratio)), steps_times(0.5)};
 }
 
 CoarserRun fewer_vertices(const Case& scene) {
   if (scene.cells.empty()) refuse("vertices", "this scene has no [[cells]]; use --estimate-error=spacing,step");
-  CoarserRun run{"vertices", std::sqrt(2.0), {}};
+  CoarserRun run{"vertices", std::sqrt(2.0), {}, {}};
   std::set<std::string> coarsened;  // cells of one type share a key
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const auto& cell = scene.cells[c];
@@ -108,7 +109,7 @@ void add_error_bars(Report& report, const CoarserRun& run, const Report& coarser
   for (const auto& [name, value] : report.quantities) {
     const auto other = coarser.quantities.find(name);
     if (other == coarser.quantities.end()) continue;
-    report.error_bars[name] += std::abs(value - other->second) / (run.ratio - 1);
+    report.error_bars[name] += std::abs(value - other->second) / std::abs(run.ratio - 1);
   }
   nlohmann::json entry;
   entry["coarser"] = run.kind;
@@ -118,7 +119,19 @@ void add_error_bars(Report& report, const CoarserRun& run, const Report& coarser
   report.extra["error_estimate"].push_back(entry);
 }
 
+CoarserRun halved_run(const CoarserRun& run) { return {run.kind, 0.5, run.halved, {}}; }
+
+void note_missing_bars(Report& report, const CoarserRun& run, const std::string& reason) {
+  report.extra["error_estimate"].push_back({{"coarser", run.kind}, {"ratio", run.ratio}, {"failed", reason}});
+  report.extra["error_bars_lack"].push_back(run.kind);
+}
+
 void print_quantities(const Report& report) {
+  if (report.quantities.empty()) return;
+  std::string lacking;
+  if (const auto found = report.extra.find("error_bars_lack"); found != report.extra.end() && !report.error_bars.empty())
+    for (const auto& kind : *found) lacking += (lacking.empty() ? "" : ", ") + kind.get<std::string>();
+  info("at the end{}:", lacking.empty() ? "" : fmt::format(" (+- without the error from: {})", lacking));
   constexpr std::size_t most = 12;  // more are in the report
   std::size_t shown = 0;
   for (const auto& [name, value] : report.quantities) {

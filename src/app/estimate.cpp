@@ -1,6 +1,7 @@
 #include "app/estimate.hpp"
 
 #include "core/error.hpp"
+#include "membrane/reference.hpp"
 #include "grid/grid.hpp"
 #include "grid/node_file.hpp"
 
@@ -127,6 +128,19 @@ double cells_of(const PopulationSettings& population, const Case& scene, const S
   return population.count > 0 ? population.count : population.hematocrit * size.volume / volume_of(cell);
 }
 
+double pairs_of_types(const Case& scene) {
+  std::vector<const CellSettings*> types;
+  const auto add = [&](const CellSettings& cell) {
+    if (std::none_of(types.begin(), types.end(), [&](const CellSettings* known) { return same_type(cell, *known); }))
+      types.push_back(&cell);
+  };
+  for (const auto& cell : scene.cells) add(cell);
+  for (const auto& population : scene.populations) add(scene.cell_types[population.type].cell);
+  double pairs = 0;
+  for (const CellSettings* cell : types) pairs += vertices_of(*cell) * vertices_of(*cell);
+  return pairs;
+}
+
 /// A rank's share of cells that are spread evenly, whole ones; and the copies of those that reach into its block and what it
 /// must know of around it, where others lie or the domain goes on.
 void share_cells(const Case& scene, int ranks, SceneSize& size) {
@@ -211,7 +225,10 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   size.cells_listed = static_cast<double>(scene.cells.size());
   size.shared = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   size.own = size.vertices;
-  if (size.shared) share_cells(scene, ranks, size);
+  if (size.shared) {
+    share_cells(scene, ranks, size);
+    size.pairs = pairs_of_types(scene);
+  }
   return size;
 }
 
@@ -312,7 +329,10 @@ MemoryEstimate require_memory(const Comm& comm, const Case& scene) {
   return estimate;
 }
 
-double estimate_set_up_s(double vertices) { return 1.3e-4 * vertices; }
+double estimate_set_up_s(const SceneSize& size, int threads) {
+  constexpr double of_vertex = 1.3e-4, of_pair = 2.6e-7;  // on one core; each pair in 30 iterations
+  return of_vertex * size.own + of_pair * size.pairs / threads;
+}
 
 double estimate_steps_s(const RunSize& size) {
   // Seconds on one core, measured with the tube of 10 um and cells of 500 to 8000 vertices: of a grid cell, ten times that where the

@@ -17,6 +17,7 @@ struct SceneSize {
   double volume = 0;                 // um3, about; 0 where the grid was not sampled
   double vertices = 0;               // of all surfaces
   double images = 1;                 // under which each surface is seen: 3 for every periodic direction
+  double pairs = 0;                  // of the vertices of a cell, over the types of cells that move with the fluid
   double cells_listed = 0;           // cells of the whole scene
   bool shared = false;               // cells are shared out over ranks: coupling.scheme = "force"
   double own = 0, copies = 0;        // vertices that a rank holds, of its own cells and of copies of others; all without sharing
@@ -60,8 +61,8 @@ struct RunSize {
   double steps = 0, cores = 1;
 };
 
-/// Of a scene's set-up, most of which goes into meshes of so many vertices, on one core, s.
-double estimate_set_up_s(double vertices);
+/// Of a scene's set-up, s: into meshes, and into the largest stable step of membranes that move with the fluid.
+double estimate_set_up_s(const SceneSize& size, int threads);
 /// Of all steps, s: within a factor of two or so, of which grid, surfaces and cores account for as much each.
 double estimate_steps_s(const RunSize& size);
 

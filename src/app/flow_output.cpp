@@ -11,7 +11,6 @@
 #include "fluid/flow_balances.hpp"
 #include "membrane/shape_measures.hpp"
 #include "output/owned_values.hpp"
-#include "parallel/agree.hpp"
 
 #include <fmt/format.h>
 
@@ -178,39 +177,15 @@ void FlowOutput::watch_cells(const std::vector<CellDiagnostics>& cells) {
   const Membranes& membranes = *simulation_.membranes();
   for (std::size_t c = 0; c < cells.size(); ++c) {
     totals_.volume_drift = larger(totals_.volume_drift, std::abs(cells[c].volume_um3 / cells[c].rest_volume_um3 - 1));
-    const int cell = static_cast<int>(c), number = membranes.number(cell);
+    const int cell = static_cast<int>(c);
     // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
     if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
-    const double drift = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
-    totals_.area_drift = larger(totals_.area_drift, drift);
-    if (!(drift <= senseless_area))
-      throw ComputationError(fmt::format(
-          "membrane: the area of {} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely "
-          "cause: the load is too large, from a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to "
-          "tell (grid.nodes); reduce the flow "
-          "(the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), lengthen its ramp_us, widen the channel, or raise "
-          "{}",
-          membranes.name(cell), 100 * drift, 100 * lysis_area,
-          few_cells_ && number < static_cast<int>(scene_.cells.size()) && scene_.cells[number].type >= 0 ? constant_key(scene_.cells[number], "area_modulus_uN_per_m")
-          : few_cells_ && number < static_cast<int>(scene_.cells.size()) ? fmt::format("cells.{}.area_modulus_uN_per_m", number)
-                                                       : "its area_modulus_uN_per_m"));
+    totals_.area_drift = larger(totals_.area_drift, std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1));
   }
-}
-
-/// What one rank finds wrong with its cells is all ranks'.
-void FlowOutput::watch_shared_cells(const std::vector<CellDiagnostics>& cells) {
-  const Comm& comm = simulation_.grid().comm();
-  std::string failure;
-  try {
-    watch_cells(cells);
-  } catch (const ComputationError& error) {
-    failure = error.what();
-  }
-  failure = agree(comm, failure);
+  if (!simulation_.shared_cells()) return;
   double drifts[2] = {totals_.volume_drift, totals_.area_drift};
-  comm.max(drifts, 2);
+  simulation_.grid().comm().max(drifts, 2);
   totals_.volume_drift = drifts[0], totals_.area_drift = drifts[1];
-  if (!failure.empty()) throw ComputationError(failure);
 }
 
 /// z for those that were packed.
@@ -255,10 +230,7 @@ void FlowOutput::measure() {
   last_.clear();
   if (auto* membranes = simulation_.membranes()) {
     const auto cells = membranes->diagnostics();
-    if (simulation_.shared_cells())
-      watch_shared_cells(cells);
-    else
-      watch_cells(cells);
+    watch_cells(cells);
     elastic_energy_ = 0;
     for (const auto& cell : cells) elastic_energy_ += cell.energy_fJ();
     const auto travelled = simulation_.coupling()->wrapped_by();
@@ -543,8 +515,11 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   if (simulation_.coupling() && simulation_.coupling()->contact_report()) {
     errors["crossings"] = now.contact.crossings;
     report.extra["contact"] = {{"crossings", now.contact.crossings}, {"limited_approaches", now.contact.limited}, {"lists", now.contact.lists}};
-    report.extra["contact"]["smallest_gap_um"] =
-        now.contact.smallest_gap < 1e30 ? nlohmann::json(now.contact.smallest_gap) : nlohmann::json();
+    for (const auto& [name, gap] : {std::pair{"smallest_gap_um", now.contact.smallest()},
+                                    {"smallest_gap_between_cells_um", now.contact.smallest_gap},
+                                    {"smallest_gap_within_cells_um", now.contact.smallest_own_gap},
+                                    {"smallest_gap_to_walls_um", now.contact.smallest_wall_gap}})
+      report.extra["contact"][name] = gap < 1e30 ? nlohmann::json(gap) : nlohmann::json();
   }
   if (simulation_.membranes()) {
     errors["volume_drift"] = now.volume_drift;
@@ -585,7 +560,7 @@ void FlowOutput::fill_blood(Report& report, const ContactReport& contact) const 
   auto block = blood_->report();
   if (simulation_.coupling()->contact_report()) {
     block["crossings"] = contact.crossings;
-    if (contact.smallest_gap < 1e30) block["smallest_gap_um"] = contact.smallest_gap;
+    if (contact.smallest() < 1e30) block["smallest_gap_um"] = contact.smallest();
   }
   blood_->add_notes(block);
   report.extra["blood"] = block;

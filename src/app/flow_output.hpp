@@ -39,12 +39,8 @@ class FlowOutput {
   FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers,
              std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
 
-  /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
-  /// a run warns at its end, beyond the second it is stopped.
-  static constexpr double lysis_area = 0.04, senseless_area = 0.1;
-
   /// After every step (and before the first, with `start`): whatever is due.
-  /// @throws ComputationError  when a file cannot be written, or a membrane has stretched far beyond what one can
+  /// @throws ComputationError  when a file cannot be written
   void after_step(bool start = false);
   /// The run ends here, before its time: a checkpoint, and what the report says of cells and bodies, but no sample that a
   /// run without the stop would not have.
@@ -79,7 +75,6 @@ class FlowOutput {
   std::vector<double> wall_stress_Pa();
   Triple axis_at_start(int number) const;
   void watch_cells(const std::vector<CellDiagnostics>& cells);
-  void watch_shared_cells(const std::vector<CellDiagnostics>& cells);
   void gather_samples();
   void write_shared_cells();
 #ifdef CORPUSCLE_HDF5

@@ -80,16 +80,19 @@ std::unique_ptr<PackedCells> packed_before(const Comm& comm, const Case& scene, 
   return nullptr;
 }
 
+/// @param changed  keys whose values are others than until the checkpoint
 /// @return what the report has counted until the checkpoint; none without a restart
-std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoint, const Place& place,
-                                 FlowSimulation& simulation) {
+std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoint, const Place& place, FlowSimulation& simulation,
+                                 std::vector<std::string>& changed) {
   if (checkpoint.empty()) return std::nullopt;
 #ifdef CORPUSCLE_HDF5
   const Restored restored = read_checkpoint(checkpoint, simulation, scene.resolved, place.files);
   const auto totals = totals_of(checkpoint, restored);
   info("continuing from {:.6g} us", simulation.time());
-  for (const auto& change : restored.changes)
+  for (const auto& change : restored.changes) {
     warn("{} = {}, and it was {} until the checkpoint", change.key, change.now, change.before);
+    changed.push_back(change.key);
+  }
   if (simulation.done())
     throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint,
                                  simulation.time()));
@@ -100,9 +103,18 @@ std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoin
   tell_missing(scene, checkpoint, place.folder, simulation);
   return totals;
 #else
-  (void)scene, (void)place, (void)simulation;
+  (void)scene, (void)place, (void)simulation, (void)changed;
   throw InputError("--restart: this build has no HDF5, so it has no checkpoints; configure with -DCORPUSCLE_HDF5=ON");
 #endif
+}
+
+/// Energies of the same shape are others once a constant is: a balance over the restart cannot close.
+void blame_changes(const std::vector<std::string>& changed, Report& report) {
+  if (changed.empty()) return;
+  for (auto& warning : report.warnings)
+    if (warning["figure"].get<std::string>().rfind("energy_balance", 0) == 0)
+      warning["message"] = fmt::format("{}. Or it is what the restart has changed: {}", warning["message"].get<std::string>(),
+                                       fmt::join(changed, ", "));
 }
 
 /// A report of what was done before the computation broke down: by all ranks, or where some are stuck by those that are
@@ -176,7 +188,8 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   print_packing(simulation);
   print_schedule(simulation.schedule());
   print_coupling(simulation);
-  const auto totals = restart(scene, options.restart, place, simulation);
+  std::vector<std::string> changed;
+  const auto totals = restart(scene, options.restart, place, simulation, changed);
   place.begin();
   Ending ending{exit_done, start_report(comm, scene)};
   Report& report = ending.report;
@@ -214,6 +227,7 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   }
   fill_packing(report, simulation);
   output->fill(report);
+  blame_changes(changed, report);
   write_report(place.folder, comm, report);
   return ending;
 }

@@ -57,7 +57,6 @@ void print_end(const Ending& ending, const std::string& folder) {
     if (value.is_number()) errors += fmt::format("  {} {:.3g}", name, value.get<double>());
   info("errors:{}", errors);
   for (const auto& warning : report.warnings) warn("{}", warning["message"].get<std::string>());
-  if (!report.quantities.empty()) info("at the end:");
   print_quantities(report);
   info("results in {}", folder);
 }
@@ -88,53 +87,67 @@ void require_same_files(const std::string& before, const std::string& now) {
     throw InputError(fmt::format("{} = {} has changed since the run began", change.key, change.now));
 }
 
-/// Error bars from coarser runs, each with its own report beside the main run's. A coarser run may be refused or break
-/// down where the main one did not: then the report says so instead.
+/// One run more, with its own report beside the main run's, and the error bars that it gives.
+/// @return exit_stopped if a signal has ended it
+/// @param reason  why there are no bars from it; else empty
+ExitCode compare(const Comm& comm, const Bars& bars, const CoarserRun& run, const Place& main, Report& report, std::string& reason) {
+  info("error bars: the same with {}", fmt::join(run.overrides, ", "));
+  auto overrides = bars.overrides;
+  overrides.insert(overrides.end(), run.overrides.begin(), run.overrides.end());
+  for (const char* off : {"output.fields=false", "output.cells=false"}) overrides.emplace_back(off);
+  const std::string own_folder = main.folder + "/coarser_" + run.kind;
+  ExitCode code = exit_done;
+  reason.clear();
+  try {
+    Case coarser = read_case(bars.file, overrides);
+    const auto files = fingerprint_files(comm, coarser);
+    require_same_files(main.files, files);
+    const auto begin = [&] { on_root(comm, [&] { prepare_folder(own_folder), remove_results(own_folder); }); };
+    open_log(comm.root(), true);
+    const Ending ending = run_scene(comm, std::move(coarser), {}, {own_folder, begin, main.run + "-" + run.kind, files});
+    open_log(comm.root());
+    if (ending.code != exit_done) reason = ending.report.stopped;
+    if (ending.code == exit_stopped) code = exit_stopped;
+    if (reason.empty()) add_error_bars(report, run, ending.report);
+  } catch (const InputError& error) {
+    reason = error.what();
+  } catch (const ComputationError& error) {
+    if (comm.size() > 1) throw;  // perhaps on some ranks only; the main run's report is written
+    reason = error.what();
+  }
+  open_log(comm.root());
+  return code;
+}
+
+/// Error bars from coarser runs. A coarser run may be refused or break down where the main one did not: where a longer step is not
+/// possible half of it tells as much, and else the report and the screen say what the bars lack.
 /// @return exit_stopped if a signal has ended it
 ExitCode estimate_errors(const Comm& comm, const Bars& bars, const Place& main, Report& report) {
-  const std::string& folder = main.folder;
   ExitCode code = exit_done;
   for (const auto& run : bars.runs) {
-    info("error bars: the same with {}", fmt::join(run.overrides, ", "));
-    auto overrides = bars.overrides;
-    overrides.insert(overrides.end(), run.overrides.begin(), run.overrides.end());
-    for (const char* off : {"output.fields=false", "output.cells=false"}) overrides.emplace_back(off);
-    const std::string own_folder = folder + "/coarser_" + run.kind;
     std::string reason;
-    try {
-      Case coarser = read_case(bars.file, overrides);
-      const auto files = fingerprint_files(comm, coarser);
-      require_same_files(main.files, files);
-      const auto begin = [&] { on_root(comm, [&] { prepare_folder(own_folder), remove_results(own_folder); }); };
-      open_log(comm.root(), true);
-      const Ending ending = run_scene(comm, std::move(coarser), {}, {own_folder, begin, main.run + "-" + run.kind, files});
-      open_log(comm.root());
-      if (ending.code != exit_done) reason = ending.report.stopped;
-      if (ending.code == exit_stopped) code = exit_stopped;
-      if (reason.empty()) add_error_bars(report, run, ending.report);
-    } catch (const InputError& error) {
-      reason = error.what();
-    } catch (const ComputationError& error) {
-      if (comm.size() > 1) throw;  // perhaps on some ranks only; the main run's report is written
-      reason = error.what();
+    code = compare(comm, bars, run, main, report, reason);
+    if (!reason.empty() && code != exit_stopped && !run.halved.empty()) {
+      info("error bars: no longer step: {}", reason);
+      code = compare(comm, bars, halved_run(run), main, report, reason);
     }
-    open_log(comm.root());
     if (reason.empty()) continue;
     warn("no error bars from {}: {}", run.kind, reason);
-    report.extra["error_estimate"].push_back({{"coarser", run.kind}, {"ratio", run.ratio}, {"failed", reason}});
+    note_missing_bars(report, run, reason);
     if (code != exit_stopped) continue;
     warn("stopped by {} before all error bars were there; the run itself is complete", reason);
     break;
   }
-  write_report(folder, comm, report);
+  write_report(main.folder, comm, report);
   return code;
 }
 
 /// A word before the making of large meshes, which takes a while.
-void announce_set_up(double vertices) {
+void announce_set_up(const SceneSize& size) {
   constexpr double noticeable = 1;
-  const double seconds = estimate_set_up_s(vertices);
-  if (seconds > noticeable) info("set-up:   {:.0f} surface vertices, about {:.2g} s", vertices, seconds);
+  const double seconds = estimate_set_up_s(size, thread_count());
+  if (seconds > noticeable)
+    info("set-up:   {:.0f} surface vertices, about {} s", size.own, seconds < 10 ? fmt::format("{:.2g}", seconds) : fmt::format("{:.0f}", seconds));
 }
 
 /// What is refused before anything is built.
@@ -184,7 +197,7 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
                    continued(options.restart));
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
-  announce_set_up(measure_scene(scene, comm.size()).own);
+  announce_set_up(measure_scene(scene, comm.size()));
   const Place place{folder.path(), [&] { folder.begin(); }, folder.run(), fingerprint_files(comm, scene)};
   Ending ending = run_scene(comm, std::move(scene), options, place);
   if (!coarser.empty() && ending.code == exit_done)
@@ -199,14 +212,14 @@ void check_case(const Comm& comm, const RunOptions& options) {
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   if (scene.stretching) {
-    announce_set_up(measure_scene(scene, 1).own);
+    announce_set_up(measure_scene(scene, 1));
     Membranes membranes(scene.cells);
     info("unknowns: {} vertices, {} triangles", membranes.vertices(), membranes.surfaces().triangles);
     info("estimate: {:.0f} MB, {:.2g} s", memory.rank(), 1.6e-7 * membranes.vertices() * 400.0 * scene.stretching->steps);
     info("{} is valid", scene.path);
     return;
   }
-  announce_set_up(measure_scene(scene, comm.size()).own);
+  announce_set_up(measure_scene(scene, comm.size()));
   Timers timers;
   const auto start = std::chrono::steady_clock::now();
   FlowSimulation simulation(comm, scene, timers);

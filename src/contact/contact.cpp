@@ -33,6 +33,16 @@ View make(const char* name, Extents... extents) {
   return View(uninitialised(std::string("corpuscle::contact::") + name), extents...);
 }
 
+/// Where the gap times its whole stiffness reaches the limit, kPa, on the way down from the range.
+double knee_of(const ContactLaw& law, double limit) {
+  double below = law.knee, above = law.range;
+  for (int halving = 0; halving < 50; ++halving) {
+    const double d = 0.5 * (below + above);
+    (d * (law.steep_stiffness(d) + law.steep_well(d).stiffness) > limit ? below : above) = d;
+  }
+  return above;
+}
+
 int last_value(const Array<int>& view, int at) {
   int value = 0;
   Kokkos::deep_copy(value, Kokkos::subview(view, at));
@@ -229,33 +239,64 @@ std::string Contact::told_text(int first) const {
 
 /// Finds crossings and puts what has crossed back, as often as it takes.
 /// @throws ComputationError  if some is not to be put back: what has gone in far has no way that is its own
-void Contact::mend_crossings(double time) {
+void Contact::mend_crossings(double time, double dt) {
   for (int repair = 0; repair <= most_repairs; ++repair) {
     const CrossingCount found = crossings();
     if (found.vertices == 0) return;
-    if (repair == most_repairs || found.deepest > deepest_share * settings_.range_um)
-      throw ComputationError(fmt::format(
-          "surfaces cross: {} at {:.6g} us, {} vertices by up to {:.2g} um, too many or too far to be put back. Likely "
-          "cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise contact.pressure_Pa "
-          "or "
-          "contact.range_um, or reduce the load",
-          told_text(found.first), time, found.vertices, found.deepest));
+    if (repair == most_repairs || found.deepest > deepest_share * settings_.range_um) {
+      const double way = fastest_crossing(dt);
+      const std::string cause =
+          way > settings_.range_um
+              ? fmt::format("They came from beyond contact.range_um = {:g}, by {:.2g} um in a step of {:.3g} us, so that contact had no "
+                            "part in it. Likely cause: a membrane that blows up, or a step too long for the load: reduce time.step_us "
+                            "or the load",
+                            settings_.range_um, way, dt)
+              : std::string("Likely cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise "
+                            "contact.pressure_Pa or contact.range_um, or reduce the load");
+      throw ComputationError(
+          fmt::format("surfaces cross: {} at {:.6g} us, {} vertices by up to {:.2g} um, too many or too far to be put back. {}",
+                      told_text(found.first), time, found.vertices, found.deepest, cause));
+    }
     if (repair == 0) count_crossings(found.vertices, found.first, time);
     correct(0, healed_share * settings_.range_um);
     find(now_);
   }
 }
 
+/// The longest way, um, that a vertex on the wrong side has made towards what it went through in a step of that length. Copies
+/// to the host: for messages.
+double Contact::fastest_crossing(double dt) const {
+  const auto host = [](const auto& view) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view); };
+  const auto first = host(lists_.first_group), item = host(now_.item);
+  const auto gap = host(now_.gap);
+  const auto weight = host(now_.weight), normal = host(now_.normal);
+  const auto triangle = host(surface_.triangle);
+  const auto v = host(surface_.v);
+  double most = 0;
+  for (int i = 0; i < own_; ++i)
+    for (int g = first(i); g < first(i + 1); ++g) {
+      if (item(g) < 0 || gap(g) >= 0) continue;
+      Vec3 velocity = load(v, i);
+      for (int d = 0; d < 3; ++d) velocity -= weight(g, d) * load(v, triangle(item_triangle(surface_, item(g)), d));
+      most = std::max(most, -dt * dot(velocity, load(normal, g)));
+    }
+  return peers_ ? peers_->comm.max(most) : most;
+}
+
 void Contact::look(double time, double dt) {
   make_lists(dt);
   find(now_);
-  mend_crossings(time);
-  report_.smallest_gap = std::min(report_.smallest_gap, smallest_gap());
+  mend_crossings(time, dt);
+  note_gaps();
 }
 
-double Contact::smallest_gap() const {
-  const double here = least_of(gap_);
-  return peers_ ? peers_->comm.min(here) : here;
+/// Of all ranks together.
+void Contact::note_gaps() {
+  double least[2] = {least_of(gap_), least_own_gap(surface_, lists_, now_)};
+  if (peers_)
+    for (double& gap : least) gap = peers_->comm.min(gap);
+  report_.smallest_gap = std::min(report_.smallest_gap, least[0]);
+  report_.smallest_own_gap = std::min(report_.smallest_own_gap, least[1]);
 }
 
 void Contact::look_at_start(double dt) {
@@ -266,7 +307,7 @@ void Contact::look_at_start(double dt) {
     throw InputError(
         fmt::format("surfaces cross: {}, by {} vertices, before the first step: move them apart (center_um, axis)",
                     told_text(found.first), found.vertices));
-  report_.smallest_gap = smallest_gap();
+  note_gaps();
 }
 
 ContactLaw Contact::law(double dt) const {
@@ -281,6 +322,7 @@ ContactLaw Contact::law(double dt) const {
     law.depth = settings_.aggregation_energy;
     law.reach = settings_.aggregation_range_um;
     law.steepness = ends / (law.reach - law.range);
+    law.knee = knee_of(law, limit);
   }
   return law;
 }

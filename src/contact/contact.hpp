@@ -54,8 +54,8 @@ class Contact {
   /// Adds the forces between surfaces at the present positions, which may be ahead of those that look() saw, to `force`
   /// [vertex, 3].
   void add_forces(double dt, bool ahead, const Components<double>& force);
-  /// The law for steps of that length: the stiffest film that they can follow is that of Stokes flow between two
-  /// membranes, whose gap opens at most at the rate 0.15 x gap x stiffness / viscosity.
+  /// The law for steps of that length: the stiffest film that they can follow, attraction included, is that of Stokes flow
+  /// between two membranes, whose gap opens at most at the rate 0.15 x gap x stiffness / viscosity.
   ContactLaw law(double dt) const;
   /// Fastest rate at which aggregated membranes relax, 1/us; the repulsion adapts to the step.
   double fastest_relaxation_per_us() const;
@@ -65,6 +65,8 @@ class Contact {
   /// Energy of the contacts that look() saw, fJ, of all ranks.
   double energy(double dt) const;
   const Array<double>& rest_area() const { return rest_.area; }
+  /// Up to which gap other bodies are looked for, um.
+  double reach() const { return reach_.other; }
   const ContactReport& report() const { return report_; }
   void resume(const ContactReport& report) { report_ = report; }
 
@@ -75,7 +77,7 @@ class Contact {
   void make_arrays();
   void push(const ContactViews& contacts, const Components<double>& sum);
   CrossingCount crossings();
-  double smallest_gap() const;
+  void note_gaps();
   Shortfall shortfall(const GapGoal& goal);
   std::string told_text(int first) const;
   void make_lists(double dt);
@@ -83,7 +85,8 @@ class Contact {
   ContactViews make_contacts(const ContactViews* shares) const;
   void find(const ContactViews& contacts);
   Shortfall correct(double share, double least);
-  void mend_crossings(double time_us);
+  void mend_crossings(double time_us, double dt);
+  double fastest_crossing(double dt) const;
   void count_crossings(int vertices, int first, double time_us);
   std::string crossing_text(int contact) const;
 

@@ -43,7 +43,7 @@ void CellLoads::take_up() {
   const SurfaceSet& set = membranes_.surfaces();
   force_ = Components<double>("corpuscle::coupling::load", set.vertices, 3);
   if (contact_) contact_->take_up(set, membranes_.templates(), membranes_.views().type);
-  if (walls_.any()) wall_ = Components<double>("corpuscle::contact::wall_load", set.vertices, 4);
+  if (walls_.any()) wall_ = Components<double>("corpuscle::contact::wall_load", set.vertices, 3);
   if (push_.empty()) return;
   share_ = Table<double>("corpuscle::coupling::push_share", membranes_.cells() + 1, 3);
   const auto share = Kokkos::create_mirror_view(share_);
@@ -57,7 +57,15 @@ void CellLoads::take_up() {
 }
 
 void CellLoads::look_at_start(double dt) {
-  if (contact_) contact_->look_at_start(dt);
+  if (!contact_) return;
+  contact_->look_at_start(dt);
+  note_wall_gap();
+}
+
+void CellLoads::note_wall_gap() {
+  if (!contact_ || !walls_.any()) return;
+  const double least = least_wall_gap(transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces().x, contact_->reach());
+  smallest_wall_gap_ = std::min(smallest_wall_gap_, comm_.min(least));
 }
 
 void CellLoads::look(double time, double dt) {
@@ -81,10 +89,10 @@ void CellLoads::gather(double dt, bool ahead) {
 
 /// Each rank knows the walls of its own block; its copies' parts go to their cells.
 void CellLoads::add_walls(double dt) {
-  wall_forces(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt), contact_->rest_area(), wall_);
-  wall_energy_ = comm_.sum(sum_of_fourth(membranes_.surfaces().vertices, wall_));
+  wall_forces(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt), contact_->rest_area(),
+              membranes_.surfaces().x, wall_);
   cells_.add_copies(wall_);
-  add_first_three(membranes_.vertices(), wall_, force_);
+  add_forces(membranes_.vertices(), wall_, force_);
 }
 
 double CellLoads::power_of_pushes() const {
@@ -93,15 +101,25 @@ double CellLoads::power_of_pushes() const {
   return comm_.sum(corpuscle::power_of_pushes(membranes_.vertices(), set.vertex_body, share_, set.v));
 }
 
-double CellLoads::contact_energy(double dt) const { return contact_ ? contact_->energy(dt) + wall_energy_ : 0; }
+double CellLoads::contact_energy(double dt) const {
+  if (!contact_) return 0;
+  const double between = contact_->energy(dt);
+  if (!walls_.any()) return between;
+  return between + comm_.sum(wall_energy(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt),
+                                         contact_->rest_area(), membranes_.surfaces().x));
+}
 
 std::optional<ContactReport> CellLoads::report() const {
   if (!contact_) return std::nullopt;
-  return contact_->report();
+  ContactReport report = contact_->report();
+  report.smallest_wall_gap = smallest_wall_gap_;
+  return report;
 }
 
 void CellLoads::resume(const ContactReport& report) {
-  if (contact_) contact_->resume(report);
+  if (!contact_) return;
+  contact_->resume(report);
+  smallest_wall_gap_ = report.smallest_wall_gap;
 }
 
 }  // namespace corpuscle

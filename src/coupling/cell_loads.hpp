@@ -20,11 +20,14 @@ class CellLoads {
 
   /// The cells at hand are others from now on. look() must follow, with valid copies.
   void take_up();
+  /// After Transfer::place().
   /// @throws InputError  if cells cross where they start
   void look_at_start(double dt_us);
   /// After a step's move: who is near whom for the next one of that length. Crossings are told and undone.
   /// @throws ComputationError  if they cannot be
   void look(double time_us, double dt_us);
+  /// After a move of cells that were placed before it.
+  void note_wall_gap();
   /// After a move: gaps must not close.
   void limit_approach(double time_us);
   /// The same for positions that are only looked ahead to.
@@ -39,7 +42,7 @@ class CellLoads {
 
   /// Of the pushes, nW, on membranes of the present velocity.
   double power_of_pushes() const;
-  /// fJ, of the contacts between cells as look() saw them and with walls at the last gather().
+  /// fJ, of the contacts between cells as look() saw them and with walls at present. After Transfer::place(), or a move since then.
   double contact_energy(double dt_us) const;
   double fastest_relaxation_per_us() const { return contact_ ? contact_->fastest_relaxation_per_us() : 0; }
   std::optional<ContactReport> report() const;
@@ -55,8 +58,8 @@ class CellLoads {
   std::unique_ptr<Contact> contact_;  // only with [contact]
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
-  Components<double> wall_;   // [vertex, 4] nN, fJ; only with walls
-  double wall_energy_ = 0;      // fJ
+  Components<double> wall_;   // [vertex, 3] nN; only with walls
+  double smallest_wall_gap_ = 1e30;  // um
   std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
   Table<double> share_;         // [own cell, 3] nN; only if any is pushed
 };

@@ -73,6 +73,11 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
 void ForceCoupling::take_up() {
   transfer_->take_up(surfaces());
   Kokkos::deep_copy(membranes_->views().force, 0.0);
+  if (!scene_.coupling->slip) return;
+  const std::size_t vertices = surfaces().vertices;
+  if (followed_.extent(0) >= vertices) return Kokkos::deep_copy(followed_, 0.0);
+  stiffening_ = Array<double>("corpuscle::coupling::stiffening", vertices);
+  followed_ = Components<double>("corpuscle::coupling::followed", vertices, 3);
 }
 
 std::string ForceCoupling::vertex_text(int vertex) const {
@@ -160,6 +165,7 @@ void ForceCoupling::check_start() {
         "lengthen the grid",
         nearest_outflow(), outflow_limit_);
   }
+  warn_of_image();
   if (packing_ && !small_) check_packing();
   measure_stability();
   find_softest();
@@ -175,13 +181,37 @@ void ForceCoupling::check_start() {
                     scene_.coupling->slip ? ", or set coupling.slip = false" : ""));
 }
 
+/// A cell that is alone meets itself beyond periodic sides.
+void ForceCoupling::warn_of_image() const {
+  constexpr double near = 0.25;  // of its extent
+  if (cells_->total() != 1 || (loads_ && loads_->report())) return;
+  std::string text;
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces().x);
+  for (int d = 0; d < 3 && !cells_->own().empty(); ++d) {
+    if (!fluid_.grid().index().periodic[d]) continue;
+    const Triple& period = fluid_.grid().period(d);
+    const double length = std::hypot(period[0], period[1], period[2]);
+    double low = 1e300, high = -1e300;
+    for (int v = 0; v < membranes_->vertices(); ++v) {
+      const double along = (x(v, 0) * period[0] + x(v, 1) * period[1] + x(v, 2) * period[2]) / length;
+      low = std::min(low, along), high = std::max(high, along);
+    }
+    if (length - (high - low) < near * (high - low))
+      text = fmt::format("{} is {:.3g} um from its own image beyond a periodic side, and there is no [contact]: that they cross would "
+                         "not be seen; add [contact], or use a larger grid",
+                         body_name(surfaces(), 0), length - (high - low));
+  }
+  text = agree(fluid_.grid().comm(), text);
+  if (!text.empty()) warn("{}", text);
+}
+
+/// Of the largest stable step: up to there steps are of second order.
+constexpr double second_order_share = 0.54;
+
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
 /// mean of the velocities at both ends: second order. Longer steps than half the largest stable one would swing then: those are
 /// Euler's.
-bool ForceCoupling::second_order(double dt) const {
-  constexpr double margin = 0.45;
-  return dt <= margin * stable_us_;
-}
+bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share * stable_us_; }
 
 /// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the
 /// outer one, which is all that resists the slip.
@@ -193,10 +223,10 @@ double ForceCoupling::resisting_share() const {
 
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
-/// kernel, and the slip, which has no interaction and is largest for the finest modes. A tenth less, since a load stiffens the
-/// membrane: two cells pressed together broke within 24 steps as long as the estimate.
+/// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
+/// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that.
 void ForceCoupling::measure_stability() {
-  constexpr double limit = 1.8;
+  constexpr double limit = 1.5;
   const double spacing = fluid_.grid().mean_spacing();
   update_surface_geometry(surfaces());
   MobilityModel model;
@@ -210,8 +240,8 @@ void ForceCoupling::measure_stability() {
 
 std::string ForceCoupling::stability_text(double dt) const {
   return fmt::format(
-      "coupling: steps of {:.3g} us, of {} order; membranes that move with the fluid are stable up to about {:.3g} us", dt,
-      second_order(dt) ? "second" : "first", stable_us_);
+      "coupling: steps of {:.3g} us, of {} order; membranes that move with the fluid are stable up to about {:.3g} us{}", dt,
+      second_order(dt) ? "second" : "first", stable_us_, scene_.coupling->slip ? " with the slip correction (coupling.slip)" : "");
 }
 
 std::map<std::string, double> ForceCoupling::report(double dt) const {
@@ -296,6 +326,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
       together([&] { membranes_->resist(anticipated_reaction(dt), forces()); });
     }
     cells_->to_copies(forces());
+    if (scene_.coupling->slip) limit_slip(dt);
     transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
@@ -316,6 +347,14 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   return statistics;
 }
 
+/// Slip is stiff: all that grows with the stiffness is left to the grid's velocity once a step could no longer follow.
+void ForceCoupling::limit_slip(double dt) {
+  const double most = (second_order(dt) ? second_order_share : 1.0) * stable_us_ / dt;
+  membranes_->measure_stiffening(stiffening_);
+  corpuscle::limit_slip(membranes_->vertices(), forces(), stiffening_, most, followed_);
+  cells_->to_copies(followed_);
+}
+
 /// Cells that have come to this rank, or copies that are others than before, are looked at where the last step left them.
 void ForceCoupling::begin_step(double time, double dt, double ahead) {
   if (!cells_->begin_step(ahead)) return;
@@ -323,7 +362,17 @@ void ForceCoupling::begin_step(double time, double dt, double ahead) {
   if (!loads_) return;
   loads_->take_up();
   update_copies();
-  loads_->look(time, dt);
+  look(time, dt);
+}
+
+/// @throws ComputationError  where surfaces cross since a membrane is torn, of the membrane
+void ForceCoupling::look(double time, double dt) {
+  try {
+    loads_->look(time, dt);
+  } catch (const ComputationError&) {  // on all ranks
+    together([&] { membranes_->compute_forces(); });
+    throw;
+  }
 }
 
 void ForceCoupling::update_copies() {
@@ -335,17 +384,18 @@ void ForceCoupling::after_move(double time, double dt) {
   const auto scope = timers_.scope("contact");
   update_copies();
   loads_->limit_approach(time);
-  loads_->look(time, dt);
+  look(time, dt);
+  loads_->note_wall_gap();
 }
 
 void ForceCoupling::resume(double time) {
   if (!loads_) return;
   update_copies();
-  loads_->look(time, lengths_us_.front());
+  look(time, lengths_us_.front());
 }
 
 SlipViews ForceCoupling::slip_of_membranes() const {
-  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), loads_ ? loads_->gaps() : Array<double>());
+  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), loads_ ? loads_->gaps() : Array<double>(), followed_);
 }
 
 double ForceCoupling::unresolved_dissipation() {

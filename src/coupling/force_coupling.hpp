@@ -54,6 +54,7 @@ class ForceCoupling : public Coupling {
  private:
   void take_places(const Case& scene, const PackedCells* packed, double contact_um);
   void check_packing();
+  void warn_of_image() const;
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);
@@ -83,6 +84,8 @@ class ForceCoupling : public Coupling {
   void begin_step(double time_us, double dt_us, double ahead_us);
   void update_copies();
   void after_move(double time_us, double dt_us);
+  void look(double time_us, double dt_us);
+  void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
 
@@ -101,6 +104,8 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
+  Array<double> stiffening_;                    // [vertex]; only with slip
+  Components<double> followed_;                 // [vertex, 3] nN, of the forces what slip follows; only with slip
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely

@@ -77,7 +77,7 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   if (vertex >= 0 || found < surfaces_.vertices) {
     if (vertex < 0) vertex = first_unowned_vertex();
     throw ComputationError(fmt::format(
-        "position: {} lies outside the grid. Likely cause: the cell was placed there, has reached the end of the grid, "
+        "position: {} lies outside the grid. Likely cause: it was placed there, has reached the end of the grid, "
         "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
         boundary_->describe_vertex(vertex)));
   }
@@ -87,11 +87,15 @@ void ImmersedFlow::check_positions(double smallest_gap) {
     const int side = static_cast<int>(comm.max(static_cast<double>(boundary_->nearest_guarded_side(vertex))));
     const std::string what = fluid_.boundaries().bounded_by(side);
     const bool wall = what == "a wall";
+    const std::string named = boundary_->describe_vertex(vertex);
+    const bool rigid = named.rfind("bodies.", 0) == 0;
     throw ComputationError(fmt::format(
         "gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
-        "them.{} Move or tilt the cell (center_um, axis), refine the grid (grid.nodes) or use a {}",
-        wall ? "the wall" : "a side", boundary_->describe_vertex(vertex), to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)),
-        smallest_gap, wall ? "film" : "flow", wall ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "", wall ? "wider channel" : "larger grid"));
+        "them.{} Move or tilt the {} (center_um, axis), refine the grid (grid.nodes) or use a {}",
+        wall ? "the wall" : "a side", named, to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)), smallest_gap,
+        wall ? "film" : "flow",
+        wall && !rigid ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "",
+        rigid ? "body" : "cell", wall ? "wider channel" : "larger grid"));
   }
   check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
 }

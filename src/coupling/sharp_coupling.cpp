@@ -3,6 +3,8 @@
 #include "core/error.hpp"
 #include "coupling/surface_checks.hpp"
 
+#include <fmt/format.h>
+
 namespace corpuscle {
 
 std::vector<TriangleMesh> body_meshes(const Case& scene, const Grid& grid) {
@@ -35,6 +37,18 @@ void SharpCoupling::check_start() {
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
+  if (rigid_bodies_) check_body_steps();
+}
+
+/// @throws InputError  for bodies that would pass fluid nodes without their noticing
+void SharpCoupling::check_body_steps() {
+  const double dt = scene_.time.step_us, way = dt * rigid_bodies_->largest_speed(), spacing = immersed_->smallest_spacing_at_surfaces();
+  if (!(way > spacing)) return;
+  throw InputError(fmt::format(
+      "bodies: one moves by {:.3g} um in a step, {:.3g} times the spacing of the grid's nodes there, {:.3g} um (its Courant number), "
+      "and 1 is the most that the flow can follow: reduce time.step_us to {:.3g} us, or bodies.velocity_mm_per_s or "
+      "bodies.angular_velocity_rad_per_s",
+      way, way / spacing, spacing, dt * spacing / way));
 }
 
 void SharpCoupling::move_rigid_bodies(double time) {

@@ -26,6 +26,7 @@ class SharpCoupling : public Coupling {
   static constexpr double starting_gap = 1.0, smallest_gap = 0.75;
 
  protected:
+  void check_body_steps();
   void move_rigid_bodies(double time_us);
 
   Case scene_;

@@ -137,6 +137,10 @@ void Membranes::resist(double beta, const Components<double>& force) {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
+void Membranes::measure_stiffening(const Array<double>& stiffening) const {
+  if (views_.cells > 0) elasticity_->measure_stiffening(views_, stiffening);
+}
+
 template <class Load>
 void Membranes::take_substeps(int count, double dt, const Load& load) {
   for (int s = 0; s < count; ++s) {
@@ -247,12 +251,24 @@ int Membranes::trouble() {
   return status_host_.read()(0) - 1;
 }
 
+void Membranes::explain_area(int cell, double drift) const {
+  throw ComputationError(fmt::format(
+      "membrane: the area of {} has changed by {:.0f} %, and a real membrane breaks at about {:.0f} %. Likely cause: the load is too "
+      "large, from a push, a fast or sudden flow or a channel too narrow for the cell, or the grid too coarse to tell (grid.nodes), or "
+      "the step too long (time.step_us); reduce the flow (the boundaries' velocities, fluid.pressure_gradient_Pa_per_um) or the push "
+      "(push_nN), lengthen its ramp_us, widen the channel, or raise its area_modulus_uN_per_m",
+      name(cell), 100 * drift, 100 * lysis_area));
+}
+
 void Membranes::explain(int cell, double dt) {
   const CellDiagnostics now = diagnostics()[cell];
   const bool finite = std::isfinite(now.area_um2) && std::isfinite(now.volume_um3) && std::isfinite(now.stretch);
+  const double drift = std::abs(now.area_um2 / now.rest_area_um2 - 1);
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
+  if (finite && now.stretch < strain_limit(law_[cell]) && drift > views_.most_area) explain_area(cell, drift);
   const CellDiagnostics before = diagnostics()[cell];
-  const std::string reached = stretch_text(law_[cell], now.stretch), was = stretch_text(law_[cell], before.stretch);
+  const std::string reached = stretch_text(law_[cell], now.stretch);
+  const std::string was = dt > 0 ? fmt::format(" ({} before)", stretch_text(law_[cell], before.stretch)) : "";
   const std::string where = fmt::format("{} at ({:.2f}, {:.2f}, {:.2f}) um", name(cell), before.centroid_um[0],
                                         before.centroid_um[1], before.centroid_um[2]);
   const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
@@ -261,12 +277,12 @@ void Membranes::explain(int cell, double dt) {
              : std::string();
   if (finite) {
     throw ComputationError(fmt::format(
-        "membrane overstretched: {}: {}{} ({} before). The load is too large or the coupling unstable: reduce time.step_us or the "
+        "membrane overstretched: {}: {}{}{}. The load is too large or the coupling unstable: reduce time.step_us or the "
         "load, or raise its shear_modulus_uN_per_m{}",
         where, reached, step, was, robin));
   }
   throw ComputationError(fmt::format(
-      "membrane position is not finite: {}{} ({} before). The traction on it is not finite or the step too long: reduce "
+      "membrane position is not finite: {}{}{}. The traction on it is not finite or the step too long: reduce "
       "time.step_us{}{}",
       where, step, was, drifts_ ? "" : ", or raise its mass_pg", robin));
 }

@@ -103,6 +103,16 @@ class Membranes {
   ///              deformations; twice that is too much
   void resist(double beta, const Components<double>& force);
 
+  /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
+  /// a run warns at its end, beyond the second it is stopped.
+  static constexpr double lysis_area = 0.04, senseless_area = 0.1;
+  /// From now on a cell whose area should be held and changes by more than `share` stops a step as an overstretched one does.
+  void limit_area(double share) { views_.most_area = share; }
+
+  /// [vertex] how many times as fast as at rest the membrane answers tangential forces per area there, about and at most.
+  /// After compute_forces().
+  void measure_stiffening(const Array<double>& stiffening) const;
+
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
   int substeps(double dt_us, double beta) const;
 
@@ -176,6 +186,7 @@ class Membranes {
   int trouble();
   double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells);
   [[noreturn]] void explain(int cell, double dt);
+  [[noreturn]] void explain_area(int cell, double drift) const;
 
   MembraneViews views_;
   std::unique_ptr<Elasticity> elasticity_;

@@ -183,10 +183,10 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
 }
 
 SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                         const Array<double>& gap) const {
+                         const Array<double>& gap, const Components<double>& followed) const {
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
-  return {law, viscosity, force, surface.normal, surface.area, gap};
+  return {law, viscosity, force, surface.normal, surface.area, gap, followed};
 }
 
 double Transfer::marker_radius() const {

@@ -36,8 +36,9 @@ class Transfer {
                    const Components<double>& velocity);
   /// What the slip of a membrane depends on, with this kernel's law.
   /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
-  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                 const Array<double>& gap = {}) const;
+  /// @param followed  [vertex, 3] nN, of the force what the slip follows; without values all of it
+  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<double>& gap = {},
+                 const Components<double>& followed = {}) const;
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;

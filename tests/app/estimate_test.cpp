@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "app/estimate.hpp"
 #include "program.hpp"
 
 using namespace app;
@@ -62,6 +63,27 @@ TEST_CASE("a coarser run that fails costs the error bars, not the run") {
   REQUIRE_FALSE(r.contains("error_bars"));
 }
 
+TEST_CASE("where a longer step is not possible half of it gives the error bars, and bars that lack some say so") {
+  const auto folder = fresh_folder("bars_of_half_steps");
+  const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.end_us=40", "output.every_us=0", "output.history_every_us=20"};
+  const auto outcome = succeed(folder, with({"run", scene("two_cells"), "--out", "out", "--estimate-error=step"}, coarse));
+  CHECK_THAT(outcome.output, Contains("no longer step: time.step_us: steps of 40 us are too long") && Contains("the same with time.step_us=10") &&
+                                 Contains("+-"));
+  const auto r = report(folder / "out");
+  REQUIRE(r["error_estimate"].size() == 1);
+  const auto& other = r["error_estimate"][0];
+  REQUIRE(other["ratio"] == 0.5);
+  // An error that goes with the step is twice what half the step changes.
+  const char* name = "cell_0_elastic_energy_fJ";
+  CHECK(r["error_bars"][name].get<double>() ==
+        Approx(2 * std::abs(r["quantities"][name].get<double>() - other["quantities"][name].get<double>())));
+  const auto lacking = succeed(folder, with({"run", scene("two_cells"), "--out", "lacking", "--estimate-error=spacing,step"},
+                                            {"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.end_us=20",
+                                             "time.step_us=10", "output.every_us=0"}));
+  CHECK_THAT(lacking.output, Contains("at the end (+- without the error from: spacing):"));
+  CHECK(report(folder / "lacking")["error_bars_lack"] == nlohmann::json{"spacing"});
+}
+
 TEST_CASE("estimates that cannot be made are refused") {
   const auto folder = fresh_folder("bars_refused");
   fail(folder, {"run", scene("tube_flow"), "--estimate-error=mesh"}, 2, {"--estimate-error=mesh", "spacing, step, vertices"});
@@ -70,6 +92,20 @@ TEST_CASE("estimates that cannot be made are refused") {
   fail(folder, with({"run", scene("stretch"), "--estimate-error=vertices"}, {"cells.0.vertices=200"}), 2,
        {"no mesh is coarser"});
   fail(folder, {"run", scene("tube_flow"), "--estimate-error", "--restart", "checkpoint.h5"}, 2, {"leave out --restart"});
+}
+
+TEST_CASE("the time that a set-up takes counts the pairs of a cell's vertices where membranes move with the fluid") {
+  CHECK(corpuscle::estimate_set_up_s({}, 1) == 0);
+  corpuscle::Case scene;
+  scene.coupling = corpuscle::CouplingSettings{};
+  scene.coupling->scheme = corpuscle::CouplingSettings::Scheme::force;
+  scene.cells.resize(2);
+  for (auto& cell : scene.cells) cell.vertices = 30000;
+  const auto seconds = [&](int threads) { return corpuscle::estimate_set_up_s(corpuscle::measure_scene(scene, 1), threads); };
+  CHECK(seconds(1) == Approx(240).epsilon(0.3));  // 4000 vertices take 4.2 s, 2000 take 0.9 s
+  CHECK(seconds(4) < 0.4 * seconds(1));
+  scene.coupling->scheme = corpuscle::CouplingSettings::Scheme::robin;
+  CHECK(seconds(1) == Approx(7.8).epsilon(0.01));
 }
 
 TEST_CASE("stretching starts at once and takes little memory") {

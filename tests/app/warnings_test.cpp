@@ -132,3 +132,21 @@ TEST_CASE("the sheet of a capsule may grow where a red cell would burst") {
   CHECK(found.number(found.lines.size() - 1, "volume_um3") == Approx(found.number(0, "volume_um3")).epsilon(1e-4));
   CHECK(report(folder / "out")["errors"]["area_drift"] == 0);
 }
+
+TEST_CASE("a cell that is alone but near its own image is warned of as two cells are") {
+  const auto folder = fresh_folder("own_image");
+  const auto scene_of = [&](double side) {
+    std::ofstream out(folder / "alone.toml");
+    out << "[time]\nstep_us = 10\nend_us = 10\n[grid]\ngenerator = \"box\"\nnodes = [17, 17, 17]\n[fluid]\nconvection = false\n"
+        << "[[cells]]\nvertices = 300\n[coupling]\nscheme = \"force\"\n";
+    for (const char* name : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"})
+      out << "[[boundary]]\nside = \"" << name << "\"\ntype = \"periodic\"\n";
+    out.close();
+    const std::string half = std::to_string(side / 2);
+    return start(folder, with({"check", "alone.toml"}, {"grid.lower_um=[-" + half + ",-" + half + ",-" + half + "]",
+                                                         "grid.upper_um=[" + half + "," + half + "," + half + "]"}))
+        .output;
+  };
+  CHECK_THAT(scene_of(8.2), Contains("cells.0 is 0.38 um from its own image") && Contains("add [contact]"));
+  CHECK_THAT(scene_of(12), !Contains("own image"));
+}

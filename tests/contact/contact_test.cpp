@@ -74,6 +74,22 @@ TEST_CASE("the law is the derivative of its energy, without bound at no gap and 
   if (law.knee > 0) CHECK(law.total_pressure(-0.01, false) > law.total_pressure(0.0, false));
 }
 
+TEST_CASE("no film is stiffer than a step can follow, with attraction as well", "[contact]") {
+  // What opens the gap of two membranes in Stokes flow: 0.15 gap stiffness / mu. Half of the gap's excess in a step is the limit.
+  const double range = GENERATE(0.25, 1.5), energy = GENERATE(0.0, 1e-3), step = GENERATE(2.0, 20.0);
+  const SurfaceSet set = two_spheres(0.4, 1);
+  Contact contact(settings(range, energy), set, Images{}, mu, 0);
+  const ContactLaw law = contact.law(step);
+  double stiffest = 0;
+  for (double d = 0.02 * range; d < range; d += 0.02 * range) {
+    constexpr double e = 1e-6;
+    const double stiffness = (law.total_pressure(d - e, true) - law.total_pressure(d + e, true)) / (2 * e);
+    stiffest = std::max(stiffest, 0.15 * d * stiffness * step / mu);
+  }
+  CHECK(stiffest < 0.5 * (1 + 1e-4));
+  CHECK(stiffest > 0.3);  // and no softer than it must be
+}
+
 TEST_CASE("gaps and forces of two spheres are those of spheres", "[contact]") {
   const double gap = 0.1, range = 0.3, radius = 2;
   double error[2];
@@ -254,6 +270,21 @@ TEST_CASE("surfaces that cross are seen, counted and parted", "[contact]") {
       InputError);
 }
 
+TEST_CASE("what flies through from beyond the range in one step is not laid to contact", "[contact]") {
+  SurfaceSet set = two_spheres(0.6, 0.3);
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  const double way = 1;
+  const auto v = on_host(set.v);
+  const auto body = on_host(set.vertex_body);
+  for (int i = 0; i < set.vertices; ++i) v(i, 2) = body(i) == 1 ? -way / dt : 0;
+  Kokkos::deep_copy(set.v, v);
+  move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? way : 0.0}; });
+  contact.limit_approach(0);
+  CHECK_THROWS_WITH(contact.look(5, dt), Catch::Contains("came from beyond contact.range_um = 0.25") && Catch::Contains("time.step_us") &&
+                                             !Catch::Contains("contact.pressure_Pa"));
+}
+
 TEST_CASE("no move takes more than half of a gap away", "[contact]") {
   SurfaceSet set = two_spheres(0.1, 0.3);
   Contact contact(settings(0.25), set, Images{}, mu, 0);
@@ -313,11 +344,14 @@ TEST_CASE("a cell does not touch itself as it is, is pushed apart where it is pi
   Contact contact(settings(0.25), set, Images{}, mu, 0);
   contact.look_at_start(dt);
   CHECK(contact.energy(dt) == 0);
+  CHECK(contact.report().smallest() == 1e30);
   move_vertices(set, [](int, const Vec3& p) {  // in the middle, as thin as a tenth
     const double r = std::hypot(p.x, p.y), t = std::min(1.0, r / 2.5);
     return Vec3{p.x, p.y, p.z * (0.1 + 0.9 * t * t)};
   });
   contact.look(0, dt);
+  CHECK(contact.report().smallest_own_gap < 0.12);  // a tenth of 1 um
+  CHECK(contact.report().smallest() == contact.report().smallest_own_gap);
   CHECK(contact.report().crossings == 0);
   CHECK(contact.energy(dt) > 0);
   const auto force = forces_of(contact, set, dt, false);

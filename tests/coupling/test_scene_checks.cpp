@@ -269,3 +269,19 @@ TEST_CASE("a grid too coarse for a body is refused with the figures and what wou
   enough.cell({0, 0, 0});
   CHECK(enough.refusal() == "accepted");
 }
+
+TEST_CASE("a rigid body that passes more than a spacing in a step is refused with its Courant number") {
+  Case scene;
+  scene.grid = scenes::cube(12, 16);
+  scene.time = {4, 8};
+  scene.fluid = FluidSettings{};
+  scene.boundaries = scenes::sides(Type::periodic);
+  scene.bodies = {scenes::sphere(2)};
+  scene.bodies[0].velocity_um_per_us = {0, 0, 0.5};
+  Timers timers;
+  CHECK_THROWS_WITH(FlowSimulation(Comm(), scene, timers), Contains("moves by 2 um in a step, 2.67 times the spacing") &&
+                                                               Contains("Courant number") && Contains("time.step_us to 1.5 us") &&
+                                                               Contains("bodies.velocity_mm_per_s"));
+  scene.bodies[0].velocity_um_per_us = {0, 0, 0.18};
+  CHECK_NOTHROW(FlowSimulation(Comm(), scene, timers));
+}

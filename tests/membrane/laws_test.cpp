@@ -92,6 +92,30 @@ TEST_CASE("the shear modulus asked for is that of every law at small strains") {
     }
 }
 
+TEST_CASE("laws tell how much stiffer strain has made them") {
+  // Second derivatives of the energy by both stretches, over those at rest.
+  const auto check = [](const auto& sheet, double a, double b) {
+    const auto energy = [&](double p, double q) { return sheet.density(p * p + q * q, p * q).value; };
+    const auto curvature = [&](double p, double q) {
+      constexpr double e = 1e-3;
+      return (energy(p + e, q) + energy(p - e, q) + energy(p, q + e) + energy(p, q - e) - 4 * energy(p, q)) / (e * e);
+    };
+    INFO("stretches " << a << ", " << b);
+    CHECK(sheet.stiffening(a * a + b * b, a * b) == Approx(curvature(a, b) / curvature(1, 1)).epsilon(1e-3));
+  };
+  for (auto [a, b] : {std::pair{1.0, 1.0}, {1.3, 0.8}, {2.0, 0.4}, {0.7, 0.7}}) {
+    check(NeoHookeanSheet{2}, a, b);
+    check(SkalakSheet{2, 0}, a, b);
+    check(SkalakSheet{2, 5}, a, b);
+  }
+  const WlcPowSpring spring{3};
+  for (double ratio : {0.6, 1.0, 1.5, 2.0}) {
+    constexpr double e = 1e-6, rest = 0.4;
+    const auto slope = [&](double r) { return spring.force((r + e) * rest, rest) - spring.force((r - e) * rest, rest); };
+    CHECK(spring.stiffening(ratio * rest, rest) == Approx(slope(ratio) / slope(1)).epsilon(1e-5));
+  }
+}
+
 TEST_CASE("the modulus of area is G (1 + 2 C) of a Skalak sheet and 3 G of a neo-Hookean one") {
   const double strain = 1e-6;
   const auto modulus = [&](const CellSettings& cell) {
