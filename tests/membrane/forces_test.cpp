@@ -70,6 +70,7 @@ struct HookeanSpring {
     return 0.5 * stiffness * (length - rest) * (length - rest);
   }
   KOKKOS_INLINE_FUNCTION static double strain(double length, double rest) { return length / rest; }
+  KOKKOS_INLINE_FUNCTION static double stiffening(double, double) { return 1; }
 };
 
 template <class Law>
