@@ -173,23 +173,25 @@ TEST_CASE("a rigid body: force and torque in the history") {
 }
 
 TEST_CASE("cells that touch: the report has gaps, crossings and the work of pushes, over a restart as well") {
-  TemporaryFolder folder;
+  const auto folder = fresh_folder("touching");
   const Words words{"run", scene("two_cells"), "--out", "out", "--set", "grid.nodes=[17,17,17]", "--set", "cell_types.0.vertices=300",
                     "--set", "output.every_us=0"};
-  succeed(folder.path, with(words, {"time.end_us=200"}));
-  const auto first = report(folder.path / "out");
+  succeed(folder, with(words, {"time.end_us=200"}));
+  const auto first = report(folder / "out");
   REQUIRE(lists(first["modules"]["active"], "contact"));
   REQUIRE(first["contact"]["crossings"] == 0);
   REQUIRE(first["errors"]["crossings"] == 0);
   REQUIRE(first["energy_fJ"]["pushed"].get<double>() > 0);
   REQUIRE(first["energy_fJ"].contains("contact"));
   const double gap = first["contact"]["smallest_gap_um"];
+  REQUIRE(first["contact"]["smallest_gap_between_cells_um"] == gap);
+  for (const char* none : {"smallest_gap_within_cells_um", "smallest_gap_to_walls_um"}) REQUIRE(first["contact"][none].is_null());
   REQUIRE(gap > 0.4);
   REQUIRE(gap < 0.7);
   Words on = with(words, {"time.end_us=240"});
   on.insert(on.end(), {"--restart", "out/checkpoint.h5"});
-  succeed(folder.path, on);
-  const auto second = report(folder.path / "out");
+  succeed(folder, on);
+  const auto second = report(folder / "out");
   REQUIRE(second["steps"] == 12);
   REQUIRE(second["contact"]["smallest_gap_um"].get<double>() < gap);
   REQUIRE(second["contact"]["lists"].get<long>() >= first["contact"]["lists"].get<long>());

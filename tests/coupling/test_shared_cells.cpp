@@ -56,7 +56,8 @@ Case carried_capsules(double end_us, bool viscous = false) {
 /// and on a plane between ranks, the other on a periodic side.
 Case touching_capsules(double end_us) {
   Case scene = carried_capsules(end_us);
-  const CellSettings cell = scene.cells[0];
+  CellSettings cell = scene.cells[0];
+  cell.shear_modulus_uN_per_m = 4;  // for steps of 15 us
   scene.cells.clear();
   for (int n = 0; n < 10; ++n) {
     scene.cells.push_back(cell);
