@@ -8,15 +8,19 @@
 2. The steady deformation at a small capillary number, 25/12 of it whatever the viscosity inside (Barthes-Biesel, J. Fluid Mech. 100,
    1980).
 """
+import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-LONG = "--long" in sys.argv
-FOLDERS = [a for a in sys.argv[1:] if not a.startswith("--")]
-PROGRAM = Path(FOLDERS[0] if FOLDERS else ROOT / "build/openmp") / "perf/capsule"
+PARSER = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+PARSER.add_argument("--long", action="store_true")
+PARSER.add_argument("build_folder", nargs="?", type=Path, default=ROOT / "build/openmp")
+OPTIONS = PARSER.parse_args()
+LONG = OPTIONS.long
+PROGRAM = OPTIONS.build_folder / "perf/capsule"
 
 # (law, capillary number, inner over outer viscosity): shear to D
 BOUNDARY_INTEGRAL = {
@@ -62,7 +66,7 @@ def small():
         for spacings, vertices in [(5, 500), (8, 1280)] if LONG else [(5, 500)]:
             for slip in (True, False):
                 end = 0.2 if ratio < 5 else 0.4
-                d, _ = run("neo-hookean", 0.01, ratio, spacings, 8, vertices, slip, 0.0005, end)
+                d, _ = run("neo-hookean", 0.01, ratio, spacings, 8, vertices, slip, 0.0003 if ratio < 1 else 0.0005, end)
                 last = d[max(d)]
                 yield f"| {ratio} | {spacings} | {'yes' if slip else 'no'} | {last:.5f} | {last / (0.01 * 25 / 12):.3f} |"
 

@@ -7,7 +7,7 @@ CellPlaces places_of(const std::vector<CellSettings>& cells) {
   CellPlaces all;
   all.types = std::move(types.references);
   for (std::size_t c = 0; c < cells.size(); ++c)
-    all.cells.push_back({types.of_cell[c], cells[c].center_um, cells[c].axis, cells[c].spin_deg});
+    all.cells.push_back({types.of_cell[c], cells[c].center_um, cells[c].axis, cells[c].spin_deg, cells[c].start_stretch});
   all.names.listed = static_cast<int>(cells.size());
   return all;
 }

@@ -7,11 +7,12 @@
 
 namespace corpuscle {
 
-/// Of a cell of undeformed shape; as in [[cells]].
+/// As in [[cells]].
 struct CellPlace {
   int type = 0;  // of CellPlaces::types
   Triple center_um{}, axis{0, 0, 1};
   double spin_deg = 0;
+  Triple start_stretch{1, 1, 1};
 };
 
 struct CellPlaces {

@@ -62,7 +62,7 @@ void SharedCells::start(const CellPlaces& places) {
     total_triangles_ += triangles_of(cell.type);
     if (blocks_.owner(to_vec3(place.center_um)) != comm_.rank()) continue;
     mine.push_back(cell);
-    TriangleMesh mesh = places.types[cell.type].mesh;
+    TriangleMesh mesh = stretched(places.types[cell.type].mesh, place.start_stretch);
     if (cell.number >= places.names.listed && places.size != 1)
       for (Triple& x : mesh.vertices)
         for (double& component : x) component *= places.size;

@@ -233,8 +233,11 @@ void ForceCoupling::measure_stability() {
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * spacing;
   model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
+  // Of each type the same cell on any number of ranks: what slip is held to goes by this.
+  std::vector<int> numbers = membranes_->first_of_types();
+  for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));
   const double fastest =
-      std::max(membranes_->fastest_relaxation_per_us(model), loads_ ? loads_->fastest_relaxation_per_us() : 0);
+      std::max(membranes_->fastest_relaxation_per_us(model, numbers), loads_ ? loads_->fastest_relaxation_per_us() : 0);
   stable_us_ = limit / fluid_.grid().comm().max(fastest);
 }
 

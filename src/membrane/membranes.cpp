@@ -215,15 +215,18 @@ void Membranes::drift(double dt, double share) {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
-double Membranes::fastest_relaxation_per_us(const MobilityModel& model) {
+std::vector<int> Membranes::first_of_types() const {
   const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
-  std::vector<int> one_of_each;
-  std::vector<bool> known(types_.size(), false);
-  for (int c = 0; c < views_.cells; ++c) {
-    if (!known[type(c)]) one_of_each.push_back(c);
-    known[type(c)] = true;
-  }
-  return one_of_each.empty() ? 0 : fastest_relaxation(model, one_of_each);
+  std::vector<int> first(types_.size(), no_cell);
+  for (int c = 0; c < views_.cells; ++c) first[type(c)] = std::min(first[type(c)], number(c));
+  return first;
+}
+
+double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers) {
+  std::vector<int> cells;
+  for (int c = 0; c < views_.cells; ++c)
+    if (std::find(numbers.begin(), numbers.end(), number(c)) != numbers.end()) cells.push_back(c);
+  return cells.empty() ? 0 : fastest_relaxation(model, cells);
 }
 
 /// Power iteration on mobility times stiffness, for some of the cells.

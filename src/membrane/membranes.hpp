@@ -1,6 +1,7 @@
 // All cells' membranes: forces, motion, diagnostics, state.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -144,9 +145,14 @@ class Membranes {
   /// @throws ComputationError  if a position is not finite
   void drift(double dt_us, double share);
 
-  /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over all types of cells, 1/us.
+  /// [type] the number of its first cell here; no_cell without one.
+  std::vector<int> first_of_types() const;
+  static constexpr int no_cell = std::numeric_limits<int>::max();
+
+  /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over those cells, 1/us; 0 without any.
   /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
-  double fastest_relaxation_per_us(const MobilityModel& model);
+  /// @param numbers  of the cells that stand for their types; those that other ranks have are passed over
+  double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers);
 
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
   void save_state();

@@ -154,14 +154,16 @@ CellReference make_reference(const CellSettings& cell) {
   return r;
 }
 
+TriangleMesh stretched(TriangleMesh mesh, const Triple& factors) {
+  if (factors == Triple{1, 1, 1}) return mesh;
+  const double whole = std::cbrt(factors[0] * factors[1] * factors[2]);
+  for (Triple& p : mesh.vertices)
+    for (int d = 0; d < 3; ++d) p[d] *= factors[d] / whole;
+  return mesh;
+}
+
 TriangleMesh placed_mesh(const CellReference& reference, const CellSettings& cell) {
-  TriangleMesh mesh = reference.mesh;
-  const Triple& s = cell.start_stretch;
-  const double whole = std::cbrt(s[0] * s[1] * s[2]);  // of the volume, which is kept
-  if (s != Triple{1, 1, 1})
-    for (Triple& p : mesh.vertices)
-      for (int d = 0; d < 3; ++d) p[d] *= s[d] / whole;
-  return transform(mesh, cell.axis, cell.spin_deg, cell.center_um);
+  return transform(stretched(reference.mesh, cell.start_stretch), cell.axis, cell.spin_deg, cell.center_um);
 }
 
 bool same_type(const CellSettings& a, const CellSettings& b) { return type_key(a) == type_key(b); }

@@ -43,6 +43,9 @@ struct CellReference {
 ///                     for a spheroid from which the cell does not come to rest
 CellReference make_reference(const CellSettings& cell);
 
+/// The mesh drawn out along x, y and z by these factors, with its volume kept.
+TriangleMesh stretched(TriangleMesh mesh, const Triple& factors);
+
 /// The cell's mesh where the settings place it.
 TriangleMesh placed_mesh(const CellReference& reference, const CellSettings& cell);
 

@@ -143,6 +143,7 @@ void Transfer::prepare_sharpening() {
     raw_[d] = Array<double>("corpuscle::transfer::raw_face", index.size());
     sharp_flux_[d] = Array<double>("corpuscle::transfer::sharp_flux", index.size());
     sharp[d] = Components<double>("corpuscle::transfer::sharp_area", index.size(), 3);
+    Kokkos::deep_copy(sharp[d], block_.area[d]);  // as those of sides stay, which other ranks' blocks see too
     for (int m = 0; m < 3; ++m)
       sharpen_faces(block_, Sharpen::areas, d, moment_, {}, Kokkos::subview(block_.area[d], Kokkos::ALL, m),
                     Kokkos::subview(sharp[d], Kokkos::ALL, m));

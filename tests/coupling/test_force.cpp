@@ -155,7 +155,7 @@ TEST_CASE("the fastest relaxation is that of the stiffest of several laws", "[co
     }
     Membranes membranes(cells);
     update_surface_geometry(membranes.surfaces());
-    return membranes.fastest_relaxation_per_us(model);
+    return membranes.fastest_relaxation_per_us(model, membranes.first_of_types());
   };
   const double springs = fastest({Law::wlc_pow}), skalak = fastest({Law::skalak}), neo_hookean = fastest({Law::neo_hookean});
   CHECK(springs != Approx(skalak).epsilon(0.05));

@@ -69,7 +69,7 @@ TEST_CASE("a stretched cell of measured membrane viscosity goes back as far with
 TEST_CASE("a stretched cell let go is back after a tenth of a second", "[coupling][force]") {
   // Measured in micropipettes: ln((q - q0) / (q + q0)) of length over width falls as exp(-t / 0.08 to 0.13 s) (Hochmuth, Worthy &
   // Evans, Biophys. J. 26, 1979); here q0 = 1.
-  const auto extent = extents(stretched_cell(100, 40000, 5e-7));
+  const auto extent = extents(stretched_cell(80, 40000, 5e-7));
   const auto left = [&](int at) {
     const double q = extent[at][0] / extent[at][1];
     return (q - 1) / (q + 1);

@@ -58,7 +58,7 @@ TriangleMesh octasphere(int levels) {
   return mesh;
 }
 
-TriangleMesh stretched(TriangleMesh mesh, const Triple& by) {
+TriangleMesh scaled(TriangleMesh mesh, const Triple& by) {
   for (auto& p : mesh.vertices)
     for (int d = 0; d < 3; ++d) p[d] *= by[d];
   return mesh;
@@ -95,7 +95,7 @@ void check_upright(const FileSurface& s) {
 
 TEST_CASE("principal axes of an ellipsoid, whichever way it lies") {
   const TriangleMesh mesh = octasphere(4);
-  const TriangleMesh ellipsoid = stretched(mesh, {1, 3, 2});
+  const TriangleMesh ellipsoid = scaled(mesh, {1, 3, 2});
   const PrincipalAxes upright = principal_axes(ellipsoid);
   const PrincipalAxes turned = principal_axes(transform(ellipsoid, {0, 1, 0}, 90, {7, 8, 9}));
   const double inscribed = std::pow(volume(mesh) / (4 * std::acos(-1.0) / 3), 2.0 / 3);
@@ -111,7 +111,7 @@ TEST_CASE("principal axes of an ellipsoid, whichever way it lies") {
 }
 
 TEST_CASE("a disc is known by its axis, and nothing else is") {
-  const auto axis_of = [](const Triple& semi_axes) { return disc_axis(principal_axes(stretched(octasphere(3), semi_axes))); };
+  const auto axis_of = [](const Triple& semi_axes) { return disc_axis(principal_axes(scaled(octasphere(3), semi_axes))); };
   CHECK(disc_axis(principal_axes(biconcave_mesh(300))));
   REQUIRE(axis_of({1, 4, 4}));
   CHECK((*axis_of({1, 4, 4}))[0] == Approx(1).epsilon(1e-12));
@@ -167,7 +167,7 @@ TEST_CASE("diameter and thickness are those of the disc, wherever it lies") {
   CHECK(lying.thickness_center_um == Approx(upright.thickness_center_um).epsilon(1e-3));
   CHECK(lying.thickness_max_um == Approx(upright.thickness_max_um).epsilon(1e-3));
   // An axis that meets vertices and edges, where chords are easily counted twice.
-  CHECK(disc_shape(stretched(octasphere(2), {2.5, 0.75, 2.5})).thickness_center_um == Approx(1.5).epsilon(1e-5));
+  CHECK(disc_shape(scaled(octasphere(2), {2.5, 0.75, 2.5})).thickness_center_um == Approx(1.5).epsilon(1e-5));
 }
 
 TEST_CASE("sizes that are not a cell's are refused with the scale that makes them one") {
@@ -288,7 +288,7 @@ TEST_CASE("a surface that passes through itself is refused with the place") {
 
 TEST_CASE("surfaces that do not cross themselves are left alone, of whatever triangles") {
   CHECK_FALSE(find_self_crossing(biconcave_mesh(500)));
-  CHECK_FALSE(find_self_crossing(moved(stretched(octasphere(4), {1, 1, 9}), {1e4, 0, 0})));
+  CHECK_FALSE(find_self_crossing(moved(scaled(octasphere(4), {1, 1, 9}), {1e4, 0, 0})));
   // A cube of twelve triangles, one of them cut into 3000: very unlike sizes.
   TriangleMesh cube{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
                     {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}}};

@@ -34,7 +34,7 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
     {"contact", {"corpuscle::contact::"}},
     {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
                           "corpuscle::blood::wall_force", "corpuscle::blood::find_bins", "corpuscle::blood::edge"}},
-    {"packing", {"corpuscle::contact::least_wall_gap", "corpuscle::transfer::scale_forces"}},
+    {"packing", {"corpuscle::transfer::scale_forces"}},
     {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
                   "corpuscle::cells::measure_boxes"}},
     {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
