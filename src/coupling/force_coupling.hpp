@@ -39,7 +39,7 @@ class ForceCoupling : public Coupling {
 
   /// The largest stable step, where it is not that of cells at rest.
   std::vector<double> state() const override;
-  void set_state(const std::vector<double>& state) override { stable_us_ = state.at(0); }
+  void set_state(const std::vector<double>& state) override;
   void cells_restored() override;
   void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;

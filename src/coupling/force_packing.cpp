@@ -35,9 +35,16 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   packed_gap_ = 0;
 }
 
+/// Of packed cells that have grown: a restart begins with them as small as packing did.
 std::vector<double> ForceCoupling::state() const {
   if (!packed_ || packed_->size == 1) return {};
-  return {stable_us_};
+  return {stable_us_, softest_.area, softest_.radius};
+}
+
+void ForceCoupling::set_state(const std::vector<double>& state) {
+  stable_us_ = state.at(0);
+  softest_.area = state.at(1);
+  softest_.radius = state.at(2);
 }
 
 /// Packing has seen points and tables: here is what the triangles themselves say.

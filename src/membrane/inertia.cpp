@@ -1,41 +1,10 @@
 #include "membrane/inertia.hpp"
 
-#include <algorithm>
 #include <cmath>
 
-#include "common/vec3.hpp"
+#include "common/symmetric.hpp"
 
 namespace corpuscle {
-
-namespace {
-
-/// Eigenvalues of a symmetric matrix, which ends diagonal, and its eigenvectors in the columns of `v` (Jacobi rotations).
-void diagonalise(double (&a)[3][3], double (&v)[3][3]) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) v[i][j] = i == j;
-  for (int sweep = 0; sweep < 50; ++sweep)
-    for (int p = 0; p < 2; ++p)
-      for (int q = p + 1; q < 3; ++q) {
-        if (std::abs(a[p][q]) <= 1e-300) continue;
-        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-        const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-        for (int k = 0; k < 3; ++k) {
-          const double kp = a[k][p], kq = a[k][q];
-          a[k][p] = c * kp - s * kq, a[k][q] = s * kp + c * kq;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double pk = a[p][k], qk = a[q][k];
-          a[p][k] = c * pk - s * qk, a[q][k] = s * pk + c * qk;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double kp = v[k][p], kq = v[k][q];
-          v[k][p] = c * kp - s * kq, v[k][q] = s * kp + c * kq;
-        }
-      }
-}
-
-}  // namespace
 
 PrincipalAxes principal_axes(const TriangleMesh& mesh) {
   const auto at = [&](int i) { return Vec3{mesh.vertices[i][0], mesh.vertices[i][1], mesh.vertices[i][2]}; };
@@ -54,17 +23,15 @@ PrincipalAxes principal_axes(const TriangleMesh& mesh) {
         second[i][j] += v / 20 * (sum[i] * sum[j] + k[0][i] * k[0][j] + k[1][i] * k[1][j] + k[2][i] * k[2][j]);
   }
   const Vec3 centre = (1 / volume) * first;
-  double a[3][3], v[3][3];
+  double a[3][3];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) a[i][j] = second[i][j] / volume - centre[i] * centre[j];
-  diagonalise(a, v);
-  std::array<int, 3> order{0, 1, 2};
-  std::sort(order.begin(), order.end(), [&](int i, int j) { return a[i][i] < a[j][j]; });
+  const SymmetricEigen eigen = eigen_of(a);
   PrincipalAxes result;
   for (int d = 0; d < 3; ++d) {
     result.centroid[d] = origin[d] + centre[d];
-    result.moment[d] = a[order[d]][order[d]];
-    for (int m = 0; m < 3; ++m) result.axis[d][m] = v[m][order[d]];
+    result.moment[d] = eigen.value[d];
+    for (int m = 0; m < 3; ++m) result.axis[d][m] = eigen.vector[d][m];
   }
   return result;
 }
