@@ -29,6 +29,29 @@ inline GridSettings cube(double side_um, int cells) {
   return grid;
 }
 
+/// Box that is periodic along x and z, where a gradient drives the fluid aslant and the upper wall slides; spacing 0.5 um, steps
+/// of 15 us, membranes as forces, tight tolerances.
+inline Case aslant_flow(double length_um, double end_us) {
+  Case scene;
+  scene.time = {15, end_us};
+  GridSettings grid;
+  const int nodes = static_cast<int>(2 * length_um) + 1;
+  grid.nodes = {nodes, 9, nodes};
+  grid.upper_um = {length_um, 4, length_um};
+  scene.grid = grid;
+  scene.fluid = FluidSettings{};
+  scene.fluid->convection = FluidSettings::Convection::none;
+  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-13;
+  scene.fluid->pressure_gradient_Pa_per_um = {-2.4, 0, -1.6};
+  scene.boundaries = sides(BoundarySettings::Type::periodic);
+  scene.boundaries[2].type = BoundarySettings::Type::wall;
+  scene.boundaries[3].type = BoundarySettings::Type::moving_wall;
+  scene.boundaries[3].velocity = Triple{1e-3, 0, -5e-4};
+  scene.coupling = CouplingSettings{};
+  scene.coupling->scheme = CouplingSettings::Scheme::force;
+  return scene;
+}
+
 /// Sphere whose centre avoids every symmetry of the grid.
 inline BodySettings sphere(double radius_um) {
   BodySettings body;

@@ -30,27 +30,12 @@ CellTypeSettings capsule(const char* name, int type, double radius_um, int verti
 /// Two kinds of capsules, 30 % of a box that is periodic along x and z, between walls of which one slides; a gradient drives
 /// them through both.
 Case crowd(double end_us) {
-  Case scene;
-  scene.time = {15, end_us};
-  GridSettings grid;
-  grid.nodes = {13, 9, 13};
-  grid.upper_um = {6, 4, 6};
-  scene.grid = grid;
-  scene.fluid = FluidSettings{};
-  scene.fluid->convection = FluidSettings::Convection::none;
-  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-13;
-  scene.fluid->pressure_gradient_Pa_per_um = {-2.4, 0, -1.6};
-  scene.boundaries = sides(Type::periodic);
-  scene.boundaries[2].type = Type::wall;
-  scene.boundaries[3].type = Type::moving_wall;
-  scene.boundaries[3].velocity = Triple{1e-3, 0, -5e-4};
+  Case scene = aslant_flow(6, end_us);
   scene.cell_types = {capsule("large", 0, 0.8, 60), capsule("small", 1, 0.7, 50)};
   scene.populations.resize(2);
   scene.populations[0].hematocrit = 0.2;
   scene.populations[1].type = 1;
   scene.populations[1].hematocrit = 0.1;
-  scene.coupling = CouplingSettings{};
-  scene.coupling->scheme = CouplingSettings::Scheme::force;
   scene.contact = ContactSettings{};
   return scene;
 }

@@ -18,20 +18,7 @@ using Type = BoundarySettings::Type;
 /// slide: 60 vertices each, 1.6 um wide, spacing 0.5 um. In 200 steps of 15 us they pass planes between ranks and both
 /// periodic sides. `viscous`: what is inside and their membranes are, of each kind another.
 Case carried_capsules(double end_us, bool viscous = false) {
-  Case scene;
-  scene.time = {15, end_us};
-  GridSettings grid;
-  grid.nodes = {17, 9, 17};
-  grid.upper_um = {8, 4, 8};
-  scene.grid = grid;
-  scene.fluid = FluidSettings{};
-  scene.fluid->convection = FluidSettings::Convection::none;
-  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-13;
-  scene.fluid->pressure_gradient_Pa_per_um = {-2.4, 0, -1.6};
-  scene.boundaries = sides(Type::periodic);
-  scene.boundaries[2].type = Type::wall;
-  scene.boundaries[3].type = Type::moving_wall;
-  scene.boundaries[3].velocity = Triple{1e-3, 0, -5e-4};
+  Case scene = aslant_flow(8, end_us);
   for (int n = 0; n < 6; ++n) {
     CellSettings cell;
     cell.shape = CellSettings::Shape::sphere;
@@ -47,8 +34,6 @@ Case carried_capsules(double end_us, bool viscous = false) {
     cell.center_um = {1.3 + 2.6 * (n % 3), n < 3 ? 1.3 : 2.7, n < 3 ? 2.1 : 6.9};
     scene.cells.push_back(cell);
   }
-  scene.coupling = CouplingSettings{};
-  scene.coupling->scheme = CouplingSettings::Scheme::force;
   return scene;
 }
 
