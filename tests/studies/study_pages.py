@@ -24,6 +24,8 @@ STUDIES = {
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
+    "blood_tubes": ("blood_tubes.md", [(["--quick", "--minutes", "0"], ["# Blood in tubes", ALL]),
+                                       (["--quick", "--minutes", "0.05"], ["# Blood in tubes", "Fahraeus"])]),
 }
 
 
