@@ -3,6 +3,7 @@ import h5py
 import numpy as np
 
 import compare_outlines
+import error_force
 import moving_sphere
 import sphere_array
 import study
@@ -357,4 +358,4 @@ class CellInTube(Problem):
         self.floors["speed_error_pc"] = sum(x for x in left if x is not None)
 
 
-PROBLEMS = [ManufacturedFlow, PlainTube, SphereArray, MovingSphere, Stretching, PushedMembrane, CellInTube]
+PROBLEMS = [ManufacturedFlow, PlainTube, SphereArray, MovingSphere, Stretching, PushedMembrane, CellInTube, *error_force.PROBLEMS]

@@ -2,6 +2,7 @@
 import math
 
 import cell_files
+import force_scenes
 from stability_runs import STEP, Series, Setup, half_step, with_values
 
 RATE = 1000.0               # 1/s, of the scenes in shear unless it varies
@@ -11,79 +12,29 @@ WORTH_fJ = 4e-4             # fJ: less work than that is thermal noise
 
 # Scenes.
 
-HEAD = """title = "{title}"
-[time]
-step_us = 10
-end_us = {end}
-[grid]
-generator = "box"
-nodes = {nodes}
-lower_um = {lower}
-upper_um = {upper}
-[fluid]
-convection = false
-[coupling]
-scheme = "force"
-[contact]
-[output]
-every_us = {end}
-history_every_us = 0
-fields = false
-checkpoint_every_us = 0
-"""
-
-
-def sides(walls, speed):
-    """Periodic all round, or between walls across y that move with -+ `speed` mm/s."""
-    text = ""
-    for name in ("i", "j", "k"):
-        for end, sign in (("min", -1), ("max", 1)):
-            kind = (f'type = "moving_wall"\nvelocity_mm_per_s = [{sign * speed:g}, 0, 0]\n' if walls and name == "j"
-                    else 'type = "periodic"\n')
-            text += f'[[boundary]]\nside = "{name}_{end}"\n{kind}'
-    return text
-
-
 def scene(scale, title, size, cells, shear=0.0, end=None, **values):
-    """A box of `size` um about the origin; sheared between walls, at `shear` 1/s, or periodic all round.
-    Overrides with dots written as __."""
-    end = end or scale.force_end_us
-    nodes = [round(s / scale.force_spacing_um) + 1 for s in size]
-    text = HEAD.format(title=title, end=end, nodes=nodes, lower=[-s / 2 for s in size], upper=[s / 2 for s in size])
-    text += sides(shear > 0, 5e-4 * shear * size[1]) + cells
-    periods = (size[0], 0 if shear > 0 else size[1], size[2])
+    """Overrides with dots written as __."""
+    text = force_scenes.box(title, size, scale.force_spacing_um, cells, shear, end or scale.force_end_us)
+    periods = force_scenes.periods(size, shear)
     fastest = 1e-3 * shear * size[1] if shear > 0 else None
     overrides = {STEP: 10} | {key.replace("__", "."): value for key, value in values.items()}
     return Setup(text, overrides, checks=(told(periods), speeds(fastest)), periods=periods)
 
 
-def cell(scale, more="", kind="[[cells]]"):
-    return f'{kind}\nvertices = {scale.force_vertices}\nmembrane_viscosity_N_s_per_m = 0\n{more}'
-
-
 def sheared(scale, rate=RATE, **values):
-    """One red cell, aslant, between walls."""
-    return scene(scale, "A red cell in shear", (12, 12, 9), cell(scale, "center_um = [0, 0, 0]\naxis = [0.5, 1, 0.2]\n"),
-                 rate, **values)
+    """One red cell between walls."""
+    return scene(scale, "A red cell in shear", (12, 12, 9), force_scenes.one_aslant(scale.force_vertices), rate, **values)
 
 
 def pressed(scale, gap_um, push_nN, **values):
-    """Two red cells face to face, rims `gap_um` apart."""
-    both = cell(scale, 'name = "rbc"\n', "[[cell_types]]")
-    for sign in (-1, 1):
-        both += (f'[[cells]]\ntype = "rbc"\ncenter_um = [0, 0, {sign * (0.5 * gap_um + HALF_THICKNESS):.6g}]\n'
-                 f"spin_deg = {17 if sign > 0 else 0}\npush_nN = [0, 0, {-sign * push_nN:g}]\n")
-    return scene(scale, "Two cells pressed face to face", (12, 12, 12), both, **values)
+    cells = force_scenes.two_face_to_face(scale.force_vertices, gap_um, push_nN)
+    return scene(scale, "Two cells pressed face to face", (12, 12, 12), cells, **values)
 
 
 def pack(scale, hematocrit, **values):
     """Many, between walls that slide past each other; without slip, with which dense blood crumples in the end."""
-    cells = cell(scale, 'name = "rbc"\n', "[[cell_types]]")
-    cells += f'[[populations]]\ntype = "rbc"\nhematocrit = {hematocrit:g}\nseed = 1\n'
+    cells = force_scenes.population(scale.force_vertices, hematocrit)
     return scene(scale, "A pack of cells in shear", (12, 12, 12), cells, 500, **({"coupling__slip": False} | values))
-
-
-HALF_THICKNESS = 1.285     # um, of the resting cell's rim
 
 
 # What makes a run wrong.
