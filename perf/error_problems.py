@@ -283,7 +283,7 @@ class CellInTube(Problem):
 
     def __init__(self, full):
         super().__init__(full)
-        self.end = 704 if full else 160   # whole numbers of every step
+        self.end = 704 if full else 120   # whole numbers of every step
         fine = self.references()[0]
         self.what = (f"`cases/straight_tube.toml` to {self.end} us. Outline: rms distance of the surfaces after putting their "
                      f"centroids together, over {self.radius_um} um (`perf/compare_outlines.py`). Speed: of the cell at the "

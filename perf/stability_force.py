@@ -103,7 +103,7 @@ STRAINED = LONG + r"|area|torn|strain|load|cross|tear"
 
 def all_rows(s, base):
     half = vertices(half_step, 2)
-    longest = base.report["stability"]["largest_stable_step_us"] if base.done else math.nan
+    longest = [(base.report["stability"]["largest_stable_step_us"], "program")] if base.done else []
 
     def row(axis, name, unit, values, setup, cause=STRAINED, **more):
         settings = dict(axis=axis, name="as forces: " + name, unit=unit, values=values, setup=setup, judge=half, quantity=HALF,
@@ -143,7 +143,7 @@ def all_rows(s, base):
         row("shear rate", "shear rate", "1/s", [10, 100, 1000, 3000, 10000, 30000], lambda rate: sheared(s, rate), bisect=s.bisect - 2,
             source="none for the scheme; the membrane's area grows with the load (10 % is torn)"),
         row("force step", "time step, slip", values=[2.5, 5, 10, 20, 50, 100, 200], setup=lambda dt: sheared(s, time__step_us=whole(dt)),
-            limits=[(longest, "program")], bisect=s.bisect - 2, **of_step),
+            limits=longest, bisect=s.bisect - 2, **of_step),
         row("force step", "time step, no slip", values=[2.5, 5, 10, 20, 50, 100, 200],
             setup=lambda dt: sheared(s, time__step_us=whole(dt), coupling__slip=False), **of_step),
         row("force step", "time step, hematocrit 0.45, no slip", values=[5, 10, 20, 50, 100],
