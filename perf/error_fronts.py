@@ -182,7 +182,7 @@ def everywhere(problems, rows_of):
     """Single settings and how they stand in each problem where they were tried."""
     table = {}
     for problem, key, text, state in judge(problems, rows_of):
-        if key not in ("nodes", "vertices", "cells", "steps", "nodes_per_diameter", "step_us"):
+        if key not in ("nodes", "vertices", "cells", "steps", "nodes_per_diameter", "spacing_um", "step_us"):
             table.setdefault(text, {"setting": text})[problem.name.split("_")[0]] = state
     names = [p.name.split("_")[0] for p in problems]
     always = [t for t, r in table.items() if {v for k, v in r.items() if k != "setting"} == {"dominated"}]

@@ -3,6 +3,7 @@ import h5py
 import numpy as np
 
 import compare_outlines
+import error_force
 import moving_sphere
 import sphere_array
 import study
@@ -282,7 +283,7 @@ class CellInTube(Problem):
 
     def __init__(self, full):
         super().__init__(full)
-        self.end = 704 if full else 160   # whole numbers of every step
+        self.end = 704 if full else 120   # whole numbers of every step
         fine = self.references()[0]
         self.what = (f"`cases/straight_tube.toml` to {self.end} us. Outline: rms distance of the surfaces after putting their "
                      f"centroids together, over {self.radius_um} um (`perf/compare_outlines.py`). Speed: of the cell at the "
@@ -357,4 +358,4 @@ class CellInTube(Problem):
         self.floors["speed_error_pc"] = sum(x for x in left if x is not None)
 
 
-PROBLEMS = [ManufacturedFlow, PlainTube, SphereArray, MovingSphere, Stretching, PushedMembrane, CellInTube]
+PROBLEMS = [ManufacturedFlow, PlainTube, SphereArray, MovingSphere, Stretching, PushedMembrane, CellInTube, *error_force.PROBLEMS]

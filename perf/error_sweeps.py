@@ -13,7 +13,9 @@ KEYS = {"nodes": "grid.nodes", "step_us": "time.step_us", "first_step_us": "time
         "momentum_tolerance": "fluid.momentum_tolerance", "divergence_tolerance": "fluid.divergence_tolerance",
         "scheme": "coupling.scheme", "coupling_tolerance": "coupling.tolerance",
         "robin_coefficient": "coupling.robin_coefficient_pg_per_um2_per_us", "force_steps": "stretching.steps",
-        "rest_tolerance": "stretching.tolerance", "body_vertices": "bodies.0.vertices"}
+        "rest_tolerance": "stretching.tolerance", "body_vertices": "bodies.0.vertices",
+        "kernel": "coupling.kernel", "slip": "coupling.slip", "pressure": "coupling.pressure",
+        "contact_range_um": "contact.range_um", "viscosity_ratio": "cells.0.viscosity_ratio"}
 
 
 def overrides(settings):

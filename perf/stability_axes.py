@@ -5,6 +5,7 @@ import re
 import h5py
 import numpy as np
 
+import stability_force
 import study
 from stability_runs import (SPEED, STEP, Series, Setup, axial_diameter, cell_speed, channel_profile, half_step, outline,
                             poiseuille, with_values)
@@ -319,10 +320,10 @@ def tolerance_rows(s):
             row("divergence_tolerance", [1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2], 0, "none; round-off near 1e-15 in U h^2")]
 
 
-def all_rows(scale, work, base):
+def all_rows(scale, work, base, force_base):
     threshold = base.report["stability"]["threshold_pg_per_um2_per_us"]
     with h5py.File(base.folder / "fields.h5") as file:
         nodes = np.array(file["nodes_um"])
     return (coupling_rows(scale, threshold) + step_rows(scale, threshold) + membrane_rows(scale)
             + flow_rows(scale, threshold) + resolution_rows(scale, threshold) + grid_rows(scale, work)
-            + placement_rows(scale, work, nodes) + tolerance_rows(scale))
+            + placement_rows(scale, work, nodes) + tolerance_rows(scale) + stability_force.all_rows(scale, force_base))

@@ -22,6 +22,8 @@ class Setup:
     case: str
     overrides: dict
     contraction: float = 1.0    # mean speed where the cell ends over that at the inlet
+    checks: tuple = ()          # of membranes that are forces, in place of the speed in a tube: run -> why it is wrong, or None
+    periods: tuple = (0, 0, 0)  # um, along x, y and z; 0: none
 
     def key(self):
         return json.dumps([self.case, self.overrides], sort_keys=True)
@@ -80,13 +82,25 @@ class Scale:
     timeout_s: float
     bisect: int
     most_vertices: int
+    force_spacing_um: float     # of the scenes whose membranes are forces
+    force_vertices: int
+    force_end_us: float
 
 
-QUICK = Scale((17, 17, 25), 300, 60, 60, 4, 8000)
-FULL = Scale((31, 31, 51), 500, 400, 3600, 6, 27472)
+QUICK = Scale((17, 17, 25), 300, 60, 60, 4, 8000, 0.75, 250, 400)
+FULL = Scale((31, 31, 51), 500, 400, 3600, 6, 27472, 0.5, 500, 2000)
 
 
 # What a run is judged by.
+
+def data_sets(group, path=""):
+    """Of a file whose entries are links to other files, which visititems() passes by."""
+    for name, item in group.items():
+        if isinstance(item, h5py.Dataset):
+            yield f"{path}{name}", item
+        else:
+            yield from data_sets(item, f"{path}{name}/")
+
 
 def not_finite(folder):
     """First data set or column of the output files that is not finite, or None."""
@@ -94,11 +108,8 @@ def not_finite(folder):
         if not (folder / name).exists():
             continue
         try:
-            with h5py.File(folder / name) as file:  # whose entries are links to other files, which visititems() passes by
-                arrays = [(path, item) for path, item in file.items() if isinstance(item, h5py.Dataset)]
-                arrays += [(f"{path}/{inner}", item) for path, group in file.items() if isinstance(group, h5py.Group)
-                           for inner, item in group.items()]
-                found = [path for path, item in arrays if item.dtype.kind == "f" and not np.isfinite(item[()]).all()]
+            with h5py.File(folder / name) as file:
+                found = [path for path, item in data_sets(file) if item.dtype.kind == "f" and not np.isfinite(item[()]).all()]
         except OSError as error:
             return f"{name} cannot be read ({error})"
         if found:
@@ -135,6 +146,8 @@ def fault(setup, run):
     for name, bound in (("volume_drift", 1e-3), ("area_drift", 0.1)):
         if run.report["errors"].get(name) is not None and run.report["errors"][name] > bound:
             return f"done with {name} = {run.report['errors'][name]:.2g}"
+    if setup.checks:
+        return next((wrong for wrong in (check(run) for check in setup.checks) if wrong), None)
     speed, mean = run.history[-1]["velocity_z_mm_per_s"], setup.overrides.get(SPEED, 2) * setup.contraction
     if not -0.1 * mean <= speed <= 3 * mean:
         return f"done with a cell at {speed:.3g} mm/s in a flow of {mean:g} mm/s"

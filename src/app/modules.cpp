@@ -21,19 +21,37 @@ std::optional<double> padded_nodes(const Case& scene) {
   return nodes;
 }
 
+/// Of any cell, placed or yet to be packed.
+template <class Property>
+bool any_cell(const Case& scene, const Property& has) {
+  return std::any_of(scene.cells.begin(), scene.cells.end(), has) ||
+         std::any_of(scene.populations.begin(), scene.populations.end(),
+                     [&](const PopulationSettings& p) { return has(scene.cell_types[p.type].cell); });
+}
+
+bool as_forces(const Case& scene) {
+  return scene.fluid && scene.has_cells() && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
+}
+
+/// Vertices of all cells; none where that takes a file or packing.
+std::optional<double> vertices_of(const Case& scene) {
+  if (scene.cells.empty() || !scene.populations.empty()) return std::nullopt;
+  double vertices = 0;
+  for (const auto& cell : scene.cells) {
+    if (!cell.mesh.empty()) return std::nullopt;
+    vertices += cell.vertices;
+  }
+  return vertices;
+}
+
 /// Counted from the definitions of the modules' arrays and the kernels that their steps launch.
 std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) {
   const auto nodes = padded_nodes(scene);
   if (module == "convection" && nodes) return ModuleCost{5, *nodes * 6 * 8 * 1e-6};
   if (module == "immersed search" && nodes) return ModuleCost{38, *nodes * 51 * 1e-6};
-  if (module == "membrane viscosity" && !scene.cells.empty() && scene.populations.empty()) {
-    double vertices = 0;
-    for (const auto& cell : scene.cells) {
-      if (!cell.mesh.empty()) return std::nullopt;
-      vertices += cell.vertices;
-    }
-    return ModuleCost{3, (18 + 22) * 8 * vertices * 1e-6};
-  }
+  const auto vertices = vertices_of(scene);
+  if (module == "membrane viscosity" && vertices && !as_forces(scene)) return ModuleCost{3, (18 + 22) * 8 * *vertices * 1e-6};
+  if (module == "slip correction" && vertices && as_forces(scene)) return ModuleCost{3, (1 + 3) * 8 * *vertices * 1e-6};
   return std::nullopt;
 }
 
@@ -43,21 +61,19 @@ ModuleList list_modules(const Case& scene, int ranks) {
   ModuleList list;
   const auto add = [&](const std::string& name, bool active) { (active ? list.active : list.left_out).push_back(name); };
   const bool fluid = scene.fluid.has_value(), cells = scene.has_cells(), bodies = !scene.bodies.empty();
-  const bool viscous = std::any_of(scene.cells.begin(), scene.cells.end(),
-                                   [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; });
   const bool files = outputs_left_out(scene.output).empty();
   add("fluid", fluid);
   add("convection", fluid && scene.fluid->convection != FluidSettings::Convection::none);
-  const bool force = fluid && cells && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
+  const bool force = as_forces(scene);
   add("immersed search", fluid && ((cells && !force) || bodies));
   add("transfer of forces", force);
-  add("viscosity ratio", std::any_of(scene.cells.begin(), scene.cells.end(),
-                                     [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
+  add("slip correction", force && scene.coupling->slip);
+  add("viscosity ratio", any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
   add("contact", force && scene.contact);
   add("rigid bodies", bodies);
   add("packing", !scene.populations.empty());
   add("membrane", cells);
-  add("membrane viscosity", viscous);
+  add("membrane viscosity", any_cell(scene, [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; }));
   add("coupling", fluid && cells);
   add("blood statistics", force && scene.blood);
   add("stretching", scene.stretching.has_value());

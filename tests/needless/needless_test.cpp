@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <unistd.h>
 
 #include "app/flow_output.hpp"
@@ -30,6 +31,8 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
     {"membrane viscosity",
      {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
+    {"slip correction", {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::transfer::slip_power",
+                         "corpuscle::membrane::stiffening", "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"}},
     {"viscosity ratio", {"corpuscle::transfer::inside", "corpuscle::fluid::excess_dissipation"}},
     {"contact", {"corpuscle::contact::"}},
     {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
@@ -160,6 +163,12 @@ Case small(const std::string& name, std::vector<std::string> overrides) {
   return read_case(case_file(name), overrides);
 }
 
+/// A capsule that is a force, and nothing that a case can leave out.
+Case bare_capsule(std::vector<std::string> overrides) {
+  overrides.insert(overrides.end(), {"grid.nodes=[17,17,17]", "cells.0.vertices=162", "time.step_us=50", "time.end_us=1000"});
+  return read_case(case_file("capsule_shear"), overrides);
+}
+
 }  // namespace
 
 TEST_CASE("what is left out would have cost what the program says", "[needless]") {
@@ -175,6 +184,10 @@ TEST_CASE("what is left out would have cost what the program says", "[needless]"
         small("tube_flow", {"fluid.convection=false"}), small("tube_flow", {}));
   check("membrane viscosity", {"corpuscle::membrane::"},
         small("straight_tube", {"cells.0.membrane_viscosity_N_s_per_m=0"}), small("straight_tube", {}));
+
+  check("slip correction", {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::membrane::stiffening",
+                             "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"},
+        bare_capsule({"coupling.slip=false"}), bare_capsule({"coupling.slip=true"}));
 
   Case sphere = small("tube_flow", {});
   sphere.bodies.emplace_back();
@@ -205,6 +218,13 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   SECTION("straight tube, membranes as forces") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"});
   }
+  SECTION("straight tube, viscous membranes as forces without slip") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "coupling.slip=false", "cells.0.membrane_viscosity_N_s_per_m=5e-7"});
+  }
+  SECTION("straight tube, membranes as forces, least of everything") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "coupling.slip=false", "fluid.convection=false",
+                                 "cells.0.membrane_viscosity_N_s_per_m=0", "output.fields=false", "output.cells=false"});
+  }
   SECTION("straight tube, membranes as forces, and cytosol") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cells.0.viscosity_ratio=5"});
   }
@@ -223,6 +243,118 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
     check_flow("straight_tube", {tube, "coupling.scheme=iterated", "coupling.tolerance=0.01"});
   }
   SECTION("curved tube") { check_flow("curved_tube", {"grid.nodes=[17,17,31]"}); }
+}
+
+namespace {
+
+/// Kernels of three steps after the first four and bytes allocated in all of them, by label.
+Counts counts_of(const Case& scene) {
+  Recorder recorder;
+  recorder.start();
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  for (int n = 0; n < 4; ++n) simulation.step();
+  recorder.stop();
+  const auto bytes = Recorder::bytes();
+  recorder.start();
+  for (int n = 0; n < 3; ++n) simulation.step();
+  recorder.stop();
+  return {Recorder::kernels(), bytes};
+}
+
+std::set<std::string> names_with(const std::map<std::string, int>& counts, const std::string& prefix) {
+  std::set<std::string> names;
+  for (const auto& [label, count] : counts)
+    if (label.rfind(prefix, 0) == 0) names.insert(label);
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("what membranes as forces can do costs nothing where a scene does not ask for it", "[needless]") {
+  const Case bare = bare_capsule({"coupling.slip=false"});
+  const Counts least = counts_of(bare);
+  for (const char* prefix : {"corpuscle::contact::", "corpuscle::blood::", "corpuscle::immersed::", "corpuscle::transfer::inside",
+                             "corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::coupling::load",
+                             "corpuscle::membrane::stiffening", "corpuscle::membrane::viscous", "corpuscle::fluid::excess"}) {
+    INFO(prefix);
+    CHECK(least.of(prefix) == 0);
+  }
+
+  SECTION("the fluid of one viscosity is that of a flow without cells") {
+    Case empty = bare;
+    empty.cells.clear();
+    empty.coupling.reset();
+    const Counts alone = counts_of(empty), tube = counts_of(small("tube_flow", {"fluid.convection=false"}));  // one that needs a projection
+    for (const char* prefix : {"corpuscle::transfer::", "corpuscle::cells::", "corpuscle::membrane::", "corpuscle::coupling::",
+                               "corpuscle::contact::", "corpuscle::blood::", "corpuscle::immersed::"}) {
+      INFO(prefix);
+      CHECK(alone.of(prefix) == 0);
+    }
+    for (const char* prefix : {"corpuscle::fluid::", "corpuscle::multigrid::"}) {
+      std::set<std::string> known = names_with(alone.kernels, prefix);
+      known.merge(names_with(tube.kernels, prefix));
+      for (const auto& name : names_with(least.kernels, prefix)) {
+        INFO(name);
+        CHECK(known.count(name) == 1);
+      }
+      CHECK(Recorder::matching(least.allocations, prefix) == Recorder::matching(alone.allocations, prefix));
+    }
+  }
+  SECTION("keys at the values that they have without being given") {
+    const Counts given = counts_of(bare_capsule({"coupling.slip=false", "cells.0.viscosity_ratio=1", "cells.0.membrane_viscosity_N_s_per_m=0",
+                                                 "cells.0.push_nN=[0,0,0]", "cells.0.start_stretch=[1,1,1]"}));
+    CHECK(given.kernels == least.kernels);
+    CHECK(given.allocations == least.allocations);
+  }
+  SECTION("a viscosity ratio brings its field and what fills it, and no more of the rest") {
+    const Counts more = counts_of(bare_capsule({"coupling.slip=false", "cells.0.viscosity_ratio=5"}));
+    CHECK(Recorder::matching(more.allocations, "corpuscle::transfer::inside") > 0);
+    for (const char* prefix : {"corpuscle::membrane::", "corpuscle::coupling::", "corpuscle::contact::", "corpuscle::cells::"}) {
+      INFO(prefix);
+      CHECK(names_with(more.kernels, prefix) == names_with(least.kernels, prefix));
+      CHECK(Recorder::matching(more.allocations, prefix) == Recorder::matching(least.allocations, prefix));
+    }
+  }
+  SECTION("contact brings its lists, and no more of the rest") {
+    const Counts more = counts_of(bare_capsule({"coupling.slip=false", "contact.range_um=0.25"}));
+    CHECK(more.of("corpuscle::contact::") > 0);
+    for (const char* prefix : {"corpuscle::membrane::", "corpuscle::fluid::", "corpuscle::multigrid::"}) {
+      INFO(prefix);
+      CHECK(Recorder::matching(more.allocations, prefix) == Recorder::matching(least.allocations, prefix));
+    }
+    CHECK(names_with(more.kernels, "corpuscle::fluid::") == names_with(least.kernels, "corpuscle::fluid::"));
+  }
+}
+
+TEST_CASE("a run says of every cell, packed ones as well, what it has active and left out", "[needless]") {
+  const auto is_active = [](const Case& scene, const std::string& module) {
+    const auto list = list_modules(scene, 1);
+    const auto has = [&](const std::vector<std::string>& names) { return std::count(names.begin(), names.end(), module) == 1; };
+    CHECK(has(list.active) != has(list.left_out));
+    return has(list.active);
+  };
+  Case blood = read_case(case_file("blood_shear"), {"coupling.slip=false"});
+  for (const char* module : {"slip correction", "viscosity ratio", "membrane viscosity", "blood statistics"}) {
+    INFO(module);
+    CHECK_FALSE(is_active(blood, module));
+  }
+  for (const char* module : {"contact", "packing", "transfer of forces"}) {
+    INFO(module);
+    CHECK(is_active(blood, module));
+  }
+  blood.cell_types.at(0).cell.viscosity_ratio = 5;
+  blood.cell_types.at(0).cell.membrane_viscosity_N_s_per_m = 5e-7;
+  blood.coupling->slip = true;
+  for (const char* module : {"slip correction", "viscosity ratio", "membrane viscosity"}) {
+    INFO(module);
+    CHECK(is_active(blood, module));
+  }
+  const Case flow = read_case(case_file("couette"), {});
+  for (const char* module : {"transfer of forces", "slip correction", "viscosity ratio", "contact", "membrane", "coupling", "blood statistics"}) {
+    INFO(module);
+    CHECK_FALSE(is_active(flow, module));
+  }
 }
 
 TEST_CASE("a sample of blood allocates nothing, and steps between samples launch nothing for it", "[needless]") {

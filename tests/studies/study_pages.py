@@ -14,11 +14,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 ALL = "not run: out of time"
 STUDIES = {
     "error_vs_time": ("error_vs_time.md", [
-        (["--quick", "--minutes", "0"], ["# Error against wall time", " 0 of ", ALL, "Cell in the straight tube"]),
-        (["--quick", "--problem", "e_stretching", "--minutes", "0.11"], ["Stretching to 200 pN", ALL, "The reference did not"])]),
+        (["--quick", "--minutes", "0"], ["# Error against wall time", " 0 of ", ALL, "Cell in the straight tube", "Pack of cells in shear"]),
+        (["--quick", "--problem", "e_stretching", "--minutes", "0.11"], ["Stretching to 200 pN", ALL, "The reference did not"]),
+        (["--quick", "--problem", "k_two_cells", "--minutes", "0.1"], ["Two cells pressed together", ALL, "Both references did not"])]),
     "stability": ("stability.md", [
         (["--quick", "--minutes", "0"], ["# Stability map", ALL]),
-        (["--quick", "--axis", "tolerances", "--minutes", "0.1"], ["# Stability map", "not run"])]),
+        (["--quick", "--axis", "tolerances", "--minutes", "0.1"], ["# Stability map", "not run"]),
+        (["--quick", "--axis", "push", "--minutes", "0.15"], ["# Stability map", "not run"])]),
     "kernels": ("kernels.md", [(["--minutes", "0"], ["# Kernels of", ALL]), (["--minutes", "0.005"], ["# Kernels of", ALL])]),
     "busy": ("busy.md", [(["--minutes", "0"], ["# The tube beside", "No ratio", ALL]),
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
