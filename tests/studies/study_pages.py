@@ -24,6 +24,14 @@ STUDIES = {
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
+    "cell_shear": ("cell_shear.md", [
+        (["--minutes", "0"], ["# A red cell in shear", "data, Pa", "0.584 to 0.921", ALL]),
+        (["--quick", "--minutes", "0.03"], ["# A red cell in shear", "0.0260, 0.0036", "stopped after", ALL])]),
+    "capsule.py": ("capsule.md", [(["--minutes", "0"], ["# Capsules in shear", "skalak, 0.6, 5", ALL]),
+                                  (["--minutes", "0.02"], ["# Capsules in shear", "stopped: out of time", ALL])]),
+    "membrane_transfer.py": ("membrane_transfer.md", [
+        (["--minutes", "0"], ["# Membranes as forces", "x + 2 y", ALL]),
+        (["--quick", "--minutes", "0.02"], ["# Membranes as forces", "stopped: out of time", ALL])]),
 }
 
 
