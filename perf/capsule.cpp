@@ -1,6 +1,7 @@
 // A capsule in shear, beside boundary integrals and small deformations; perf/capsule.py runs the tables.
-//   capsule LAW CAPILLARY RATIO A_OVER_H BOX VERTICES SLIP STEP UNTIL    prints t,D,angle
-// LAW is neo-hookean or skalak; BOX in radii; SLIP 0 or 1; STEP and UNTIL in units of the inverse shear rate.
+//   capsule LAW CAPILLARY RATIO A_OVER_H BOX VERTICES KERNEL SLIP STEP UNTIL EVERY    prints t,D,angle
+// LAW is neo-hookean or skalak; BOX in radii; KERNEL three-point or four-point; SLIP 0 or 1; STEP, UNTIL and EVERY (between two
+// lines) in units of the inverse shear rate.
 #include "capsule.hpp"
 
 #include <cstring>
@@ -10,7 +11,7 @@
 using namespace corpuscle;
 
 int main(int argc, char** argv) {
-  return run_program(argc, argv, 9, "LAW CAPILLARY RATIO A_OVER_H BOX VERTICES SLIP STEP UNTIL", [](int, char** words) {
+  return run_program(argc, argv, 11, "LAW CAPILLARY RATIO A_OVER_H BOX VERTICES KERNEL SLIP STEP UNTIL EVERY", [](int, char** words) {
     scenes::ShearedCapsule capsule;
     capsule.law = std::strcmp(words[1], "skalak") == 0 ? CellSettings::Law::skalak : CellSettings::Law::neo_hookean;
     capsule.capillary = std::atof(words[2]);
@@ -18,13 +19,13 @@ int main(int argc, char** argv) {
     capsule.cells_per_radius = std::atof(words[4]);
     capsule.box = std::atof(words[5]);
     capsule.vertices = std::atoi(words[6]);
-    capsule.slip = std::atoi(words[7]) != 0;
-    capsule.step = std::atof(words[8]);
-    const double until = std::atof(words[9]);
+    if (std::strcmp(words[7], "four-point") == 0) capsule.kernel = CouplingSettings::Kernel::four_point;
+    capsule.slip = std::atoi(words[8]) != 0;
+    capsule.step = std::atof(words[9]);
+    const double until = std::atof(words[10]), every = std::atof(words[11]);
     Timers timers;
     FlowSimulation simulation(Comm(), capsule.scene(until), timers);
-    double next = 0.5 * std::min(until, 1.0);
-    const double every = next;
+    double next = every;
     long momentum = 0;
     int steps = 0;
     while (!simulation.done()) {
@@ -35,7 +36,7 @@ int main(int argc, char** argv) {
       if (t < next - 1e-9 && !simulation.done()) continue;
       next += every;
       const auto shape = scenes::deformation(body_mesh(simulation.surfaces()[0], 0));
-      std::printf("%.4g,%.5f,%.2f\n", t, shape.taylor, shape.angle_deg);
+      std::printf("%.6g,%.5f,%.2f\n", t, shape.taylor, shape.angle_deg);
       std::fflush(stdout);
     }
     std::printf("# %.2f momentum iterations a step\n", static_cast<double>(momentum) / steps);

@@ -126,6 +126,17 @@ def toml(value):
     return str(value)
 
 
+def reference(name):
+    """Rows of a table of references/, whose first lines, behind #, say where it is from; numbers where they are numbers."""
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text or None
+    with open(ROOT / "perf" / "references" / f"{name}.csv") as file:
+        return [{k: value(v) for k, v in row.items()} for row in csv.DictReader(line for line in file if line[0] != "#")]
+
+
 def provenance():
     """Where and with what a study was made."""
     def output(*command):

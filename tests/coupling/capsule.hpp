@@ -14,6 +14,7 @@ struct ShearedCapsule {
   double cells_per_radius = 5;  // of the grid
   double box = 8;               // walls and images from each other
   int vertices = 500;
+  CouplingSettings::Kernel kernel = CouplingSettings::Kernel::three_point;
   bool slip = true;
   double step = 0.01;
 
@@ -43,6 +44,7 @@ struct ShearedCapsule {
     scene.cells = {cell};
     scene.coupling = CouplingSettings{};
     scene.coupling->scheme = CouplingSettings::Scheme::force;
+    scene.coupling->kernel = kernel;
     scene.coupling->slip = slip;
     return scene;
   }

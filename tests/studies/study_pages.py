@@ -28,6 +28,20 @@ STUDIES = {
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
     "blood_tubes": ("blood_tubes.md", [(["--quick", "--minutes", "0"], ["# Blood in tubes", ALL]),
                                        (["--quick", "--minutes", "0.05"], ["# Blood in tubes", "Fahraeus"])]),
+    "cell_shear": ("cell_shear.md", [
+        (["--minutes", "0"], ["# A red cell in shear", "data, Pa", "0.584 to 0.921", ALL]),
+        (["--quick", "--minutes", "0.03"], ["# A red cell in shear", "0.0260, 0.0036", "stopped after", ALL])]),
+    "capsule.py": ("capsule.md", [(["--minutes", "0"], ["# Capsules in shear", "skalak, 0.6, 5", ALL]),
+                                  (["--minutes", "0.02"], ["# Capsules in shear", "stopped: out of time", ALL])]),
+    "stiff_in_shear": ("stiff_in_shear.md", [
+        (["--minutes", "0"], ["# Stiff cells in shear", "spheroid of 0.3", ALL]),
+        (["--quick", "--minutes", "0.01"], ["# Stiff cells in shear", "stopped after"])]),
+    "tube_cytosol": ("tube_cytosol.md", [
+        (["--minutes", "0"], ["# A cell with fluid inside", "ratio 5", ALL]),
+        (["--quick", "--minutes", "0.02"], ["# A cell with fluid inside", "empty, sharp", "stopped after", ALL])]),
+    "membrane_transfer.py": ("membrane_transfer.md", [
+        (["--minutes", "0"], ["# Membranes as forces", "x + 2 y", ALL]),
+        (["--quick", "--minutes", "0.02"], ["# Membranes as forces", "stopped: out of time", ALL])]),
 }
 
 
