@@ -22,6 +22,10 @@ STUDIES = {
     "kernels": ("kernels.md", [(["--minutes", "0"], ["# Kernels of", ALL]), (["--minutes", "0.005"], ["# Kernels of", ALL])]),
     "busy": ("busy.md", [(["--minutes", "0"], ["# The tube beside", "No ratio", ALL]),
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
+    "pack": ("pack.md", [(["--minutes", "0"], ["# Dense packs in shear", "| 1000 |", ALL, "5.38 (at 124 /s)"]),
+                         (["--quick", "--slip", "false", "--minutes", "0.03"], ["# Dense packs in shear", ALL])]),
+    "two_cells": ("two_cells.md", [(["--minutes", "0"], ["# Two red cells", "| 0.5 | 0.33 | 1000 | 20 |", ALL]),
+                                   (["--quick", "--minutes", "0.03"], ["# Two red cells", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
 }
