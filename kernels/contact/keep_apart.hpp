@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/extremes.hpp"
-#include "common/sums.hpp"
+#include "common/joined.hpp"
 #include "contact/find_contacts.hpp"
 
 namespace corpuscle {
@@ -16,7 +16,7 @@ struct GapGoal {
 };
 
 /// What the gaps of a move fall short of.
-struct Shortfall {
+struct Shortfall : Joined<Shortfall> {
   double most = 0;      // over the goal itself
   int limited = 0;      // contacts below their goal
   int through = 0;      // of them, those whose vertex is on the wrong side
@@ -29,11 +29,6 @@ struct Shortfall {
     through = through + b.through;
     if (b.first < first) first = b.first;
   }
-  KOKKOS_INLINE_FUNCTION Shortfall& operator+=(const Shortfall& b) {
-    join(b);
-    return *this;
-  }
-  KOKKOS_INLINE_FUNCTION void operator+=(const volatile Shortfall& b) volatile { join(b); }
 };
 
 /// push: the way by which vertex and corners must move for the gap, along the normal as it was found, to be at least
@@ -82,7 +77,7 @@ KOKKOS_INLINE_FUNCTION bool adjacent(const SurfaceSet& s, int t, int other) {
   return false;
 }
 
-struct CrossingCount {
+struct CrossingCount : Joined<CrossingCount> {
   int vertices = 0;     // on the wrong side
   int first = 1 << 30;  // the lowest contact of them
   double deepest = 0;   // um
@@ -93,11 +88,6 @@ struct CrossingCount {
     if (b.first < first) first = b.first;
     if (b.deepest > deepest) deepest = b.deepest;
   }
-  KOKKOS_INLINE_FUNCTION CrossingCount& operator+=(const CrossingCount& b) {
-    join(b);
-    return *this;
-  }
-  KOKKOS_INLINE_FUNCTION void operator+=(const volatile CrossingCount& b) volatile { join(b); }
 };
 
 /// Contacts on the wrong side: inside another body, or beyond the own surface where the vertex was on the other side of
@@ -141,33 +131,6 @@ inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactList
       },
       count);
   return count;
-}
-
-/// Whether the lists still hold: largest way that a vertex has gone since they were made, beyond the mean of all, plus
-/// the way of one step ahead.
-inline double largest_way(const SurfaceSet& surface, const Components<double>& listed, double dt) {
-  const SurfaceSet s = surface;
-  Sums<6> mean;
-  Kokkos::parallel_reduce(
-      "corpuscle::contact::mean_way", Policy(0, s.vertices),
-      KOKKOS_LAMBDA(int v, Sums<6>& sum) {
-        for (int d = 0; d < 3; ++d) {
-          sum[d] += s.x(v, d) - listed(v, d);
-          sum[3 + d] += s.v(v, d);
-        }
-      },
-      mean);
-  const double share = 1.0 / s.vertices;
-  const Vec3 way = share * Vec3{mean[0], mean[1], mean[2]}, speed = share * Vec3{mean[3], mean[4], mean[5]};
-  double most = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::contact::largest_way", Policy(0, s.vertices),
-      KOKKOS_LAMBDA(int v, double& worst) {
-        const double own = norm(load(s.x, v) - load(listed, v) - way) + dt * norm(load(s.v, v) - speed);
-        worst = larger(worst, own);
-      },
-      Largest(most));
-  return most;
 }
 
 }  // namespace corpuscle

@@ -2,12 +2,13 @@
 #pragma once
 
 #include "common/counting_sort.hpp"
+#include "common/joined.hpp"
 #include "immersed/views.hpp"
 
 namespace corpuscle {
 
 /// Bounds of the triangles' centres, and the largest distance from a centre to a corner. Sums join.
-struct TriangleBounds {
+struct TriangleBounds : Joined<TriangleBounds> {
   double lower[3] = {1e300, 1e300, 1e300}, upper[3] = {-1e300, -1e300, -1e300}, radius = 0;
 
   template <class Other>
@@ -18,11 +19,6 @@ struct TriangleBounds {
     }
     if (b.radius > radius) radius = b.radius;
   }
-  KOKKOS_INLINE_FUNCTION TriangleBounds& operator+=(const TriangleBounds& b) {
-    join(b);
-    return *this;
-  }
-  KOKKOS_INLINE_FUNCTION void operator+=(const volatile TriangleBounds& b) volatile { join(b); }
 };
 
 struct TriangleBins {

@@ -52,64 +52,58 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
   return nearest;
 }
 
-/// um from any of the sides, within `reach`, of the vertices [vertex, 3] whose markers are at home; 1e30 where none is so near.
-/// Vertices may have moved on since the markers were placed, by less than walls bend.
-inline double least_wall_gap(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
-                             const Components<double>& vertices, double reach) {
-  const Lattice lattice = grid_lattice;
-  const auto x = vertices;
-  const MarkerViews m = markers;
-  const WallSides walls = wall_sides;
+/// Walls beside vertices whose markers are at home. Vertices may have moved on since the markers were placed, by less than walls
+/// bend.
+struct WallContacts {
+  Lattice lattice;
+  MarkerViews markers;
+  WallSides walls;
+  Components<double> x;  // [vertex, 3] um
+  double reach = 0;      // um
+
+  /// Of a marker's vertex; far where no wall is within reach, or the marker is not at home.
+  KOKKOS_INLINE_FUNCTION WallGap of(int marker) const {
+    if (!markers.home(marker)) return {};
+    const double eta[3] = {markers.eta(marker, 0), markers.eta(marker, 1), markers.eta(marker, 2)};
+    return nearest_wall(lattice, walls, eta, load(x, markers.vertex(marker)), reach);
+  }
+};
+
+/// um; 1e30 where none is within reach.
+inline double least_wall_gap(const WallContacts& contacts) {
+  const WallContacts c = contacts;
   double least = 1e30;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::least_wall_gap", Policy(0, m.count),
-      KOKKOS_LAMBDA(int marker, double& sum) {
-        if (!m.home(marker)) return;
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        sum = smaller(sum, nearest_wall(lattice, walls, eta, load(x, m.vertex(marker)), reach).gap);
-      },
-      Smallest(least));
+      "corpuscle::contact::least_wall_gap", Policy(0, c.markers.count),
+      KOKKOS_LAMBDA(int marker, double& sum) { sum = smaller(sum, c.of(marker).gap); }, Smallest(least));
   return least;
 }
 
-/// fJ, of the walls' repulsion, at vertices as above.
-inline double wall_energy(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
-                          const ContactLaw& contact_law, const Array<double>& rest_area, const Components<double>& vertices) {
-  const Lattice lattice = grid_lattice;
-  const MarkerViews m = markers;
-  const WallSides walls = wall_sides;
+/// fJ, of the walls' repulsion. @param rest_area  [vertex] um2
+inline double wall_energy(const WallContacts& contacts, const ContactLaw& contact_law, const Array<double>& rest_area) {
+  const WallContacts c = contacts;
   const ContactLaw law = contact_law;
-  const auto x = vertices;
   double energy = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::wall_energy", Policy(0, m.count),
+      "corpuscle::contact::wall_energy", Policy(0, c.markers.count),
       KOKKOS_LAMBDA(int marker, double& sum) {
-        if (!m.home(marker)) return;
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        const int v = m.vertex(marker);
-        const WallGap wall = nearest_wall(lattice, walls, eta, load(x, v), law.range);
-        if (wall.gap < law.range) sum += rest_area(v) * law.repulsion_energy(wall.gap);
+        const WallGap wall = c.of(marker);
+        if (wall.gap < law.range) sum += rest_area(c.markers.vertex(marker)) * law.repulsion_energy(wall.gap);
       },
       energy);
   return energy;
 }
 
-/// force [vertex, 3] = that of the walls on the vertices at home, nN; zero elsewhere. Areas at rest.
-inline void wall_forces(const Lattice& grid_lattice, const MarkerViews& markers, const WallSides& wall_sides,
-                        const ContactLaw& contact_law, const Array<double>& rest_area, const Components<double>& vertices,
+/// force [vertex, 3] = that of the walls on the vertices at home, nN; zero elsewhere. @param rest_area  [vertex] um2
+inline void wall_forces(const WallContacts& contacts, const ContactLaw& contact_law, const Array<double>& rest_area,
                         const Components<double>& force) {
-  const Lattice lattice = grid_lattice;
-  const MarkerViews m = markers;
-  const WallSides walls = wall_sides;
+  const WallContacts c = contacts;
   const ContactLaw law = contact_law;
-  const auto x = vertices;
   Kokkos::deep_copy(Exec(), force, 0.0);
   Kokkos::parallel_for(
-      "corpuscle::contact::wall_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        if (!m.home(marker)) return;
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        const int v = m.vertex(marker);
-        const WallGap wall = nearest_wall(lattice, walls, eta, load(x, v), law.range);
+      "corpuscle::contact::wall_forces", Policy(0, c.markers.count), KOKKOS_LAMBDA(int marker) {
+        const WallGap wall = c.of(marker);
+        const int v = c.markers.vertex(marker);
         if (wall.gap < law.range) store(force, v, (rest_area(v) * law.repulsion(wall.gap)) * wall.inward);
       });
 }

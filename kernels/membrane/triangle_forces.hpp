@@ -28,13 +28,29 @@ KOKKOS_INLINE_FUNCTION Dihedral dihedral(const Vec3& normal, const Vec3& other, 
   return {dot(normal, other), dot(cross(normal, other), along)};
 }
 
-/// dE/dtheta of E = k_b (1 - cos(theta - theta0)) (Equation 7).
+/// Two triangles that close like a book: (1 - cos) has no slope left when they lie on each other and then goes the other way, so
+/// that a sheet under compression folds through itself, and with it what is inside and outside. Beyond a right angle their
+/// moment has |tan(theta / 2)| - 1 on top, without bound up to the fold. Not of edges that are sharp at rest.
+struct Fold {
+  double moment = 0, energy = 0;  // over k_b
+
+  KOKKOS_INLINE_FUNCTION Fold(const Dihedral& angle, double cos_rest) {
+    constexpr double sharp = 0.5, least = 1e-9, right_angle = 1.5707963267948966;
+    if (angle.cosine >= 0 || cos_rest < sharp) return;
+    const double open = 1 + angle.cosine > least ? 1 + angle.cosine : least;
+    const double over = std::fabs(angle.sine) / open - 1;
+    moment = angle.sine < 0 ? -over : over;
+    energy = right_angle - std::acos(open - 1) - std::log(open);
+  }
+};
+
+/// dE/dtheta of E = k_b (1 - cos(theta - theta0)) (Equation 7), and of a fold.
 KOKKOS_INLINE_FUNCTION double bending_moment(const Dihedral& angle, double cos_rest, double sin_rest, double k_b) {
-  return k_b * (angle.sine * cos_rest - angle.cosine * sin_rest);
+  return k_b * (angle.sine * cos_rest - angle.cosine * sin_rest + Fold(angle, cos_rest).moment);
 }
 
 KOKKOS_INLINE_FUNCTION double bending_energy(const Dihedral& angle, double cos_rest, double sin_rest, double k_b) {
-  return k_b * (1 - (angle.cosine * cos_rest + angle.sine * sin_rest));
+  return k_b * (1 - (angle.cosine * cos_rest + angle.sine * sin_rest) + Fold(angle, cos_rest).energy);
 }
 
 struct TriangleState {

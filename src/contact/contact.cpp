@@ -9,11 +9,9 @@
 #include "contact/contact_pushes.hpp"
 #include "contact/find_contacts.hpp"
 #include "contact/keep_apart.hpp"
+#include "contact/step_ways.hpp"
 #include "core/error.hpp"
-#include "core/log.hpp"
-#include "immersed/surface.hpp"
 #include "membrane/interface.hpp"
-#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
@@ -21,12 +19,12 @@ namespace {
 
 constexpr double far_away = 1e30;      // um
 constexpr double keep_share = 0.5;     // of a gap, in one step
+constexpr double followed_way = 1.0 / 3;  // of a cell's radius, in one step: lists of what is near take in all within several such ways
 constexpr double opening = 0.15;       // rate at which a film's gap follows its pressure, over gap and viscosity
 constexpr double followed = 0.5;       // of a gap's excess, that one step may undo
 constexpr double healed_share = 0.1;   // of the range, to which crossings are opened again
 constexpr double deepest_share = 0.8;  // of the range, from which crossings are put back
 constexpr int most_passes = 8, most_repairs = 20;
-constexpr long told = 5;  // crossings that are told one by one
 
 template <class View, class... Extents>
 View make(const char* name, Extents... extents) {
@@ -41,6 +39,19 @@ double knee_of(const ContactLaw& law, double limit) {
     (d * (law.steep_stiffness(d) + law.steep_well(d).stiffness) > limit ? below : above) = d;
   }
   return above;
+}
+
+/// um, of a sphere of the smallest body's surface, of the first so many.
+double smallest_radius(const SurfaceSet& set, int bodies) {
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.first_vertex);
+  const auto area = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.area);
+  double least = far_away;
+  for (int body = 0; body < bodies; ++body) {
+    double sum = 0;
+    for (int v = first(body); v < first(body + 1); ++v) sum += area(v);
+    least = std::min(least, std::sqrt(sum / (4 * std::acos(-1.0))));
+  }
+  return least;
 }
 
 int last_value(const Array<int>& view, int at) {
@@ -62,6 +73,7 @@ Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, co
   reach_.apart = apart * settings.range_um;
   make_arrays();
   if (peers) return;  // take_up() follows
+  longest_way_ = followed_way * smallest_radius(surfaces, surfaces.cells);
   Kokkos::deep_copy(rest_.x, surfaces.x);
   Kokkos::deep_copy(rest_.area, surfaces.area);
 }
@@ -70,6 +82,7 @@ void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Arra
   surface_ = set;
   make_arrays();
   fill_rest(types, type, surface_, rest_.x, rest_.area);
+  if (longest_way_ == 0) longest_way_ = followed_way * smallest_radius(types, types.bodies);
 }
 
 /// For the present surfaces, of whose contacts nothing is known.
@@ -130,12 +143,13 @@ ContactViews Contact::make_contacts(const ContactViews* shares) const {
 }
 
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
-void Contact::make_lists(double dt) {
+/// @param way  um, from the present lists to the end of the next step
+void Contact::make_lists(double way, double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
   if (surface_.vertices == 0) return;  // on this rank, at present
-  if (skin_ >= 0 && largest_way(surface_, listed_, dt) < 0.5 * skin_) return;
+  if (skin_ >= 0 && way < 0.5 * skin_) return;
   copy_vertices(surface_.vertices, surface_.x, listed_);
-  const double way = largest_way(surface_, listed_, dt);
+  if (skin_ >= 0) way = step_ways(surface_, listed_, 0, dt).whole;
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
   make_bins(std::max(with_skin.other, with_skin.own));
@@ -152,6 +166,11 @@ void Contact::make_lists(double dt) {
     now_ = make_contacts(nullptr);
   }
   ++report_.lists;
+}
+
+StepWays Contact::ways(double dt) const {
+  if (surface_.vertices == 0) return {};
+  return step_ways(surface_, skin_ < 0 ? surface_.x : listed_, std::max(0.0, skin_), dt);
 }
 
 void Contact::find(const ContactViews& contacts) {
@@ -199,29 +218,6 @@ Shortfall Contact::shortfall(const GapGoal& goal) {
   return found;
 }
 
-void Contact::count_crossings(int vertices, int first, double time) {
-  if (report_.crossings < told)
-    warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
-  report_.crossings += vertices;
-}
-
-std::string Contact::crossing_text(int contact) const {
-  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lists_.first_group);
-  const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surface_.vertex_body);
-  const auto triangle_body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surface_.triangle_body);
-  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surface_.x);
-  const int item = last_value(now_.item, contact);
-  int v = 0;
-  while (first(v + 1) <= contact) ++v;
-  const int other = triangle_body(item_triangle(surface_, item));
-  const std::string where = fmt::format("({:.4g}, {:.4g}, {:.4g}) um", x(v, 0), x(v, 1), x(v, 2));
-  if (item_image(surface_, item) == 0 && body(v) == other)
-    return fmt::format("{} with itself at {}", body_name(surface_, other), where);
-  const bool image = body_name(surface_, body(v)) == body_name(surface_, other);
-  return fmt::format("{} and {}{} at {}", body_name(surface_, body(v)), body_name(surface_, other),
-                     image ? " beyond a periodic side" : "", where);
-}
-
 /// Of all ranks together, but for the contact that is named.
 CrossingCount Contact::crossings() {
   CrossingCount found = find_crossings(surface_, lists_, now_, side_, own_);
@@ -229,12 +225,6 @@ CrossingCount Contact::crossings() {
   found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
   found.deepest = peers_->comm.max(found.deepest);
   return found;
-}
-
-/// On all ranks, of the lowest rank that has one.
-std::string Contact::told_text(int first) const {
-  const std::string mine = first < lists_.groups ? crossing_text(first) : "";
-  return peers_ ? agree(peers_->comm, mine) : mine;
 }
 
 /// Finds crossings and puts what has crossed back, as often as it takes.
@@ -263,30 +253,11 @@ void Contact::mend_crossings(double time, double dt) {
   }
 }
 
-/// The longest way, um, that a vertex on the wrong side has made towards what it went through in a step of that length. Copies
-/// to the host: for messages.
-double Contact::fastest_crossing(double dt) const {
-  const auto host = [](const auto& view) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view); };
-  const auto first = host(lists_.first_group), item = host(now_.item);
-  const auto gap = host(now_.gap);
-  const auto weight = host(now_.weight), normal = host(now_.normal);
-  const auto triangle = host(surface_.triangle);
-  const auto v = host(surface_.v);
-  double most = 0;
-  for (int i = 0; i < own_; ++i)
-    for (int g = first(i); g < first(i + 1); ++g) {
-      if (item(g) < 0 || gap(g) >= 0) continue;
-      Vec3 velocity = load(v, i);
-      for (int d = 0; d < 3; ++d) velocity -= weight(g, d) * load(v, triangle(item_triangle(surface_, item(g)), d));
-      most = std::max(most, -dt * dot(velocity, load(normal, g)));
-    }
-  return peers_ ? peers_->comm.max(most) : most;
-}
-
 void Contact::look(double time, double dt) {
-  make_lists(dt);
+  make_lists(refuse_runaways(time, dt), dt);
   find(now_);
   mend_crossings(time, dt);
+  refuse_fast_approach(time, dt);
   note_gaps();
 }
 
@@ -300,7 +271,7 @@ void Contact::note_gaps() {
 }
 
 void Contact::look_at_start(double dt) {
-  make_lists(dt);
+  make_lists(ways(dt).whole, dt);
   find(now_);
   const auto found = crossings();
   if (found.vertices > 0)

@@ -23,6 +23,8 @@ struct ContactPeers {
 };
 
 struct GapGoal;
+struct LongestWay;
+struct StepWays;
 struct Shortfall;
 
 class Contact {
@@ -40,7 +42,7 @@ class Contact {
 
   /// What is near what at the surfaces' present positions. Crossings are counted, told and undone.
   /// @param dt  of the next step, us
-  /// @throws ComputationError  if a crossing cannot be undone
+  /// @throws ComputationError  if a crossing cannot be undone, or something goes further in a step than contact can follow
   void look(double time_us, double dt);
   /// The same before the first step, where crossings are an error of the input.
   /// @throws InputError
@@ -80,7 +82,8 @@ class Contact {
   void note_gaps();
   Shortfall shortfall(const GapGoal& goal);
   std::string told_text(int first) const;
-  void make_lists(double dt);
+  StepWays ways(double dt) const;
+  void make_lists(double way, double dt);
   void make_bins(double width);
   ContactViews make_contacts(const ContactViews* shares) const;
   void find(const ContactViews& contacts);
@@ -89,6 +92,11 @@ class Contact {
   double fastest_crossing(double dt) const;
   void count_crossings(int vertices, int first, double time_us);
   std::string crossing_text(int contact) const;
+  std::string place_text(int vertex) const;
+  std::string pair_text(int vertex, int item) const;
+  double refuse_runaways(double time_us, double dt);
+  void refuse_fast_approach(double time_us, double dt);
+  void refuse(const LongestWay& found, double most, const std::function<std::string()>& text) const;
 
   ContactSettings settings_;
   SurfaceSet surface_;
@@ -103,6 +111,7 @@ class Contact {
   ContactViews now_, ahead_;   // at the positions of look(), and at those ahead if there are any
   Components<double> listed_;  // [vertex, 3] um, where the lists were made
   double skin_ = -1;           // um; negative before there are lists
+  double longest_way_ = 0;     // um, in a step, beyond the mean of all
   Array<int> side_;            // [vertex]
   Array<double> gap_;          // [vertex]
   int movable_ = 0;            // vertices of cells

@@ -62,9 +62,13 @@ void CellLoads::look_at_start(double dt) {
   note_wall_gap();
 }
 
+WallContacts CellLoads::at_walls(double reach) const {
+  return {transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces().x, reach};
+}
+
 void CellLoads::note_wall_gap() {
   if (!contact_ || !walls_.any()) return;
-  const double least = least_wall_gap(transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces().x, contact_->reach());
+  const double least = least_wall_gap(at_walls(contact_->reach()));
   smallest_wall_gap_ = std::min(smallest_wall_gap_, comm_.min(least));
 }
 
@@ -89,8 +93,8 @@ void CellLoads::gather(double dt, bool ahead) {
 
 /// Each rank knows the walls of its own block; its copies' parts go to their cells.
 void CellLoads::add_walls(double dt) {
-  wall_forces(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt), contact_->rest_area(),
-              membranes_.surfaces().x, wall_);
+  const ContactLaw law = contact_->law(dt);
+  wall_forces(at_walls(law.range), law, contact_->rest_area(), wall_);
   cells_.add_copies(wall_);
   add_forces(membranes_.vertices(), wall_, force_);
 }
@@ -105,8 +109,8 @@ double CellLoads::contact_energy(double dt) const {
   if (!contact_) return 0;
   const double between = contact_->energy(dt);
   if (!walls_.any()) return between;
-  return between + comm_.sum(wall_energy(transfer_.block().lattice, transfer_.views(), walls_, contact_->law(dt),
-                                         contact_->rest_area(), membranes_.surfaces().x));
+  const ContactLaw law = contact_->law(dt);
+  return between + comm_.sum(wall_energy(at_walls(law.range), law, contact_->rest_area()));
 }
 
 std::optional<ContactReport> CellLoads::report() const {

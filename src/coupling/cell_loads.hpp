@@ -50,6 +50,8 @@ class CellLoads {
 
  private:
   void add_walls(double dt_us);
+  /// @param reach_um  to which walls are looked for
+  WallContacts at_walls(double reach_um) const;
 
   SharedCells& cells_;
   const Membranes& membranes_;

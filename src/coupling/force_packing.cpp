@@ -66,7 +66,7 @@ void ForceCoupling::check_packing() {
     sides.wall[side / 2][side % 2] = boundary.type != BoundarySettings::Type::periodic;
   }
   const double to_side =
-      sides.any() ? least_wall_gap(transfer_->block().lattice, transfer_->views(), sides, surfaces().x, settings.range_um) : 1e30;
+      sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);
   if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
   throw InputError(fmt::format("populations: two cells are {:.3g} um from each other, or one {:.3g} um from a side, and gap_um = {:g} is asked "

@@ -285,6 +285,56 @@ TEST_CASE("what flies through from beyond the range in one step is not laid to c
                                              !Catch::Contains("contact.pressure_Pa"));
 }
 
+TEST_CASE("what goes further in a step than contact can follow is refused, whether or not it has met anything", "[contact]") {
+  // Spheres of radius 2 um: a third of that is the most. Lists of all that is within such ways would take in everything.
+  SurfaceSet set = two_spheres(0.4, 0.3);
+  Contact contact(settings(0.25), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  const auto moving = [&](int vertex, const Vec3& way) {
+    const auto v = on_host(set.v);
+    const auto body = on_host(set.vertex_body);
+    for (int i = 0; i < set.vertices; ++i)
+      for (int d = 0; d < 3; ++d) v(i, d) = vertex < 0 ? (body(i) == 1 ? way[d] / dt : 0.0) : (i == vertex ? way[d] / dt : 0.0);
+    Kokkos::deep_copy(set.v, v);
+  };
+  SECTION("one vertex far from everything") {
+    moving(7, {GENERATE(3.0, 1e8), 0, 0});
+    CHECK_THROWS_WITH(contact.look(5, dt), Catch::Contains("contact: cells.0, vertex 7 at (") && Catch::Contains("um and 5 us") &&
+                                               Catch::Contains("0.66") && Catch::Contains("time.step_us"));
+  }
+  SECTION("a velocity that is not a number") {
+    moving(7, {std::nan(""), 0, 0});
+    CHECK_THROWS_AS(contact.look(5, dt), ComputationError);
+  }
+  SECTION("one vertex that is already away, at rest") {
+    const double way = GENERATE(3.0, 1e8);
+    const auto x = on_host(set.x);
+    x(7, 0) += way;
+    Kokkos::deep_copy(set.x, x);
+    CHECK_THROWS_AS(contact.look(5, dt), ComputationError);
+  }
+  SECTION("two bodies, faster than the range but no further than lists take in") {
+    const double along = GENERATE(-0.3, 0.3);  // together and apart
+    moving(-1, {0, 0, along});
+    CHECK_THROWS_WITH(contact.look(5, dt), Catch::Contains("approach or part by 0.3 um") && Catch::Contains("cells.0") && Catch::Contains("cells.1") &&
+                                               Catch::Contains("contact.range_um = 0.25") && Catch::Contains("time.step_us"));
+  }
+  SECTION("past each other") {
+    moving(-1, {0.28, 0, 0});
+    CHECK_NOTHROW(contact.look(5, dt));
+  }
+  SECTION("slower") {
+    moving(-1, {0, 0, -0.24});
+    CHECK_NOTHROW(contact.look(5, dt));
+  }
+  SECTION("all together") {
+    const auto v = on_host(set.v);
+    for (int i = 0; i < set.vertices; ++i) v(i, 0) = 5 / dt;
+    Kokkos::deep_copy(set.v, v);
+    CHECK_NOTHROW(contact.look(5, dt));
+  }
+}
+
 TEST_CASE("no move takes more than half of a gap away", "[contact]") {
   SurfaceSet set = two_spheres(0.1, 0.3);
   Contact contact(settings(0.25), set, Images{}, mu, 0);

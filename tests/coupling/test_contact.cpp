@@ -195,6 +195,16 @@ TEST_CASE("a capsule that load compresses to a third stays stable with slip, and
   CHECK(largest_difference(x[0], x[1]) < 0.5);  // of some 3 um: they slide past each other
 }
 
+TEST_CASE("cells that go further in a step than contact can follow stop all ranks", "[coupling][contact][ranks]") {
+  // Pulled apart: each goes some 2 um in a step, through nothing. Lists that took in all of that would have no bounds.
+  Timers timers;
+  FlowSimulation simulation(Comm(), pressed_cells(0.6, -20, 20, 400, 0.75), timers);
+  CHECK_THROWS_WITH([&] {
+    while (!simulation.done()) simulation.step();
+  }(), Catch::Contains("contact: cells.") && Catch::Contains(" um in a step of 20 us") && Catch::Contains("beyond the mean of all") &&
+           Catch::Contains("time.step_us"));
+}
+
 TEST_CASE("a torn membrane that crosses another is told as torn", "[coupling][contact]") {
   Timers timers;
   FlowSimulation simulation(Comm(), pressed_cells(0.6, 0, 20, 40, 0.75), timers);

@@ -266,6 +266,30 @@ TEST_CASE("signed dihedral angle") {
   CHECK(highest > 20 * units::degree);
 }
 
+TEST_CASE("triangles do not fold through each other, and up to a right angle bend by Equation 7 alone") {
+  const double rest = GENERATE(-20, 0, 30) * units::degree, k_b = 2.8e-4;
+  const auto at = [](double theta) { return Dihedral{std::cos(theta), std::sin(theta)}; };
+  const auto moment = [&](double theta) { return bending_moment(at(theta), std::cos(rest), std::sin(rest), k_b); };
+  const auto energy = [&](double theta) { return bending_energy(at(theta), std::cos(rest), std::sin(rest), k_b); };
+  for (double degrees : {-178.0, -150.0, -100.0, -89.0, -30.0, 10.0, 89.0, 91.0, 135.0, 170.0, 179.0}) {
+    const double theta = degrees * units::degree, h = 1e-5;
+    INFO("at " << degrees << " degrees, " << rest / units::degree << " at rest");
+    CHECK(moment(theta) == Approx((energy(theta + h) - energy(theta - h)) / (2 * h)).epsilon(1e-5));
+    if (std::abs(degrees) < 90) CHECK(moment(theta) == Approx(k_b * std::sin(theta - rest)));
+    if (std::abs(degrees) > 134) CHECK(moment(theta) * theta > k_b * std::sin(theta - rest) * theta);
+  }
+  // From both sides against the fold, ever more so.
+  for (double side : {-1.0, 1.0})
+    for (double degrees : {150.0, 170.0, 179.0})
+      CHECK(side * moment(side * (degrees + 0.9) * units::degree) > side * moment(side * degrees * units::degree));
+  CHECK(moment(179.9 * units::degree) > 1000 * k_b);
+  CHECK(moment(-179.9 * units::degree) < -1000 * k_b);
+  CHECK(std::isfinite(energy(180 * units::degree)));
+  // What is sharp at rest is at rest.
+  const double sharp = 120 * units::degree;
+  CHECK(bending_moment(at(sharp), std::cos(sharp), std::sin(sharp), k_b) == Approx(0).margin(1e-18));
+}
+
 TEST_CASE("reference states") {
   CellSettings settings = cell_settings(500);
   const CellReference shape = make_reference(settings);

@@ -1,0 +1,121 @@
+// How far surfaces go in a step: whether lists still hold, and what goes further than contact can follow.
+#pragma once
+
+#include "common/extremes.hpp"
+#include "common/joined.hpp"
+#include "common/sums.hpp"
+#include "contact/contact_lists.hpp"
+
+namespace corpuscle {
+
+/// The longest way, with the lowest vertex that makes it; what is not a number is longer than all.
+struct LongestWay : Joined<LongestWay> {
+  double way = 0;  // um
+  int vertex = 1 << 30;
+  int item = -1;  // relative to which, if to any
+
+  template <class Other>
+  KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
+    const bool nothing = way != way, other_nothing = b.way != b.way;
+    const bool longer = nothing == other_nothing ? b.way > way || (!(b.way < way) && b.vertex < vertex) : other_nothing;
+    if (!longer) return;
+    way = b.way;
+    vertex = b.vertex;
+    item = b.item;
+  }
+};
+
+/// Means over all vertices.
+struct MeanMotion {
+  Vec3 way, velocity;
+};
+
+/// @param listed  [vertex, 3] um, from where ways are measured
+inline MeanMotion mean_motion(const SurfaceSet& surface, const Components<double>& listed) {
+  const SurfaceSet s = surface;
+  Sums<6> mean;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::mean_way", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, Sums<6>& sum) {
+        for (int d = 0; d < 3; ++d) {
+          sum[d] += s.x(v, d) - listed(v, d);
+          sum[3 + d] += s.v(v, d);
+        }
+      },
+      mean);
+  const double share = 1.0 / s.vertices;
+  return {share * Vec3{mean[0], mean[1], mean[2]}, share * Vec3{mean[3], mean[4], mean[5]}};
+}
+
+/// Of all vertices, beyond the mean of all.
+struct StepWays : Joined<StepWays> {
+  double whole = 0;  // um, from where the lists were made to where the present velocity brings a vertex in a step
+  LongestWay step;   // of that what one step may have made, or will
+
+  template <class Other>
+  KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
+    whole = larger(whole, b.whole);
+    step.join(b.step);
+  }
+};
+
+/// @param listed  [vertex, 3] um, where the lists were made
+/// @param skin    um: vertices had gone half of it at most before the last step
+inline StepWays step_ways(const SurfaceSet& surface, const Components<double>& listed, double skin, double dt) {
+  const SurfaceSet s = surface;
+  const MeanMotion mean = mean_motion(surface, listed);
+  StepWays ways;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::step_ways", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, StepWays& sum) {
+        const double behind = norm(load(s.x, v) - load(listed, v) - mean.way), ahead = dt * norm(load(s.v, v) - mean.velocity);
+        StepWays own;
+        own.whole = behind + ahead;
+        own.step.way = larger(behind - 0.5 * skin, ahead);
+        own.step.vertex = v;
+        sum += own;
+      },
+      ways);
+  return ways;
+}
+
+/// The longest way towards or away from each other that one of the first `vertices` and a triangle in its list make in a step,
+/// if it is longer than `least`.
+inline LongestWay longest_approach(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int vertices,
+                                   double dt, double least) {
+  const SurfaceSet s = surface;
+  const Images images = image_shifts;
+  const ContactLists in = lists;
+  LongestWay longest;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::longest_approach", Policy(0, vertices),
+      KOKKOS_LAMBDA(int v, LongestWay& sum) {
+        const Vec3 velocity = load(s.v, v);
+        for (int e = in.first(v); e < in.first(v + 1); ++e) {
+          const int t = item_triangle(s, in.item(e));
+          Vec3 relative[3];
+          bool slow = true;
+          for (int c = 0; c < 3; ++c) {
+            relative[c] = dt * (velocity - load(s.v, s.triangle(t, c)));
+            slow = slow && dot(relative[c], relative[c]) <= least * least;
+          }
+          if (slow) continue;
+          const Corners k = corners(s, t, {});
+          const Vec3 p = load(s.x, v) + images.shift[item_image(s, in.item(e))];
+          const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+          const Vec3 away = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
+          const Vec3 way = at.weight[0] * relative[0] + at.weight[1] * relative[1] + at.weight[2] * relative[2];
+          const double distance = norm(away);
+          LongestWay own;
+          own.way = distance > 1e-9 ? std::fabs(dot(way, away)) / distance : norm(way);
+          if (own.way <= least) continue;
+          own.vertex = v;
+          own.item = in.item(e);
+          sum += own;
+        }
+      },
+      longest);
+  return longest;
+}
+
+}  // namespace corpuscle
