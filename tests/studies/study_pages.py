@@ -24,6 +24,8 @@ STUDIES = {
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
+    "blood_speed": ("blood_speed.md", [(["--minutes", "0"], ["# What blood costs", "half the step", ALL]),
+                                       (["--quick", "--minutes", "0.04"], ["# What blood costs", "half the step", ALL])]),
 }
 
 
