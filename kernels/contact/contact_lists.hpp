@@ -115,7 +115,7 @@ inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
       "corpuscle::contact::fill_items", Policy(0, s.surface.vertices), KOKKOS_LAMBDA(int v) {
         const int begin = out.first(v);
         int end = begin;
-        s.visit(v, [&](int item) {
+        if (begin < out.first(v + 1)) s.visit(v, [&](int item) {
           int to = end++;
           for (; to > begin && out.item(to - 1) > item; --to) out.item(to) = out.item(to - 1);
           out.item(to) = item;

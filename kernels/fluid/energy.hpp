@@ -78,7 +78,7 @@ inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& 
         const int s = index.stride(d), face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
         if (kind(c) != NodeKind::fluid || (kind(beyond) != NodeKind::fluid && kind(beyond) != NodeKind::boundary)) continue;
         const double r = face_viscosity(v, kind, c, beyond), share = kind(beyond) == NodeKind::boundary ? 1 : 0.5;
-        if (r != 1 || v.least != 1) sum += share * dot(excess_flux(v, r, u, index, d, face), load(u, face) - load(u, face - s));
+        if (exceeds(v, r)) sum += share * dot(excess_flux(v, r, u, index, d, face), load(u, face) - load(u, face - s));
       }
     return sum;
   });

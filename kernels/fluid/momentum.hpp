@@ -167,11 +167,17 @@ struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes>, 
   std::conditional_t<skewed, ViscousCoefficients, NormalCoefficients> g;
   double mass_over_mu, density_over_mu;
 
+  /// Before apply() with this velocity.
+  template <class Velocity>
+  void prepare(const Velocity& u) const {
+    find_excess(static_cast<const Viscosity&>(*this), u, kind, index);
+  }
+
   template <class Velocity>
   KOKKOS_FORCEINLINE_FUNCTION auto apply(const Velocity& u, int c) const {
     using Real = typename Velocity::non_const_value_type;
     Vector3<Real> image = (mass_over_mu * volume(c)) * load(u, c) - viscous_force<skewed>(g, u, index, c);
-    subtract_excess(static_cast<const Viscosity&>(*this), u, kind, index, c, image);
+    subtract_excess(static_cast<const Viscosity&>(*this), kind, index, c, image);
     if constexpr (convective)
       for (int m = 0; m < 3; ++m) {
         double sum = 0;
@@ -192,6 +198,7 @@ struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes>, 
 /// out = A u at fluid nodes, zero elsewhere.
 template <class Operator>
 void apply_momentum(const Operator& a, const Array<float>& inverse, const Components<float>& u, const Components<float>& out) {
+  a.prepare(u);
   for_owned_rounded("corpuscle::fluid::momentum_operator", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = a.index.cell(i, j, k);
     const float fluid = inverse(c) > 0 ? 1 : 0;
@@ -204,6 +211,7 @@ void apply_momentum(const Operator& a, const Array<float>& inverse, const Compon
 template <class Operator>
 double momentum_residual(const Operator& a, double mu, const Components<double>& history, const Components<double>& grad_p,
                          const Components<double>& u, const Array<float>& inverse, const Components<float>& residual) {
+  a.prepare(u);
   return sum_owned("corpuscle::fluid::momentum_residual", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = a.index.cell(i, j, k);
     const double fluid = inverse(c) > 0 ? 1 : 0, scale = 1 / mu;

@@ -7,6 +7,7 @@
 #include "common/chebyshev.hpp"
 #include "common/vec3.hpp"
 #include "fluid/masked_gradient.hpp"
+#include "fluid/viscosity.hpp"
 #include "grid/halo_copy.hpp"
 
 namespace corpuscle {
@@ -68,10 +69,12 @@ struct MultigridLevel : LevelOperator<CycleReal> {
 };
 
 /// Conductances between nodes that both have a pressure, on owned cells and one halo layer.
-template <class Real>
-void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask& mask,
-                       const LevelOperator<Real>& level) {
+/// @param viscosity  UniformViscosity, or what they are times as large by
+template <class Real, class Viscosity = UniformViscosity>
+void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask& mask, const LevelOperator<Real>& level,
+                       const Viscosity& viscosity = {}) {
   const IndexSpace index = level.index;
+  const Viscosity relative = viscosity;
   for (int d = 0; d < 3; ++d) {
     const auto g = level.conductance[d];
     const auto from = coefficient[d];
@@ -80,7 +83,7 @@ void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask
     upper[d] += 1;
     for_box("corpuscle::multigrid::conductance", {-1, -1, -1}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
       const int c = index.cell(i, j, k);
-      g(c) = mask(c) && mask(c - stride) ? from(c) : 0.0;
+      g(c) = mask(c) && mask(c - stride) ? from(c) * mean_viscosity(relative, c, c - stride) : 0.0;
     });
   }
 }

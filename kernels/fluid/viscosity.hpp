@@ -15,6 +15,7 @@ struct VaryingViscosity {
   double least;
   Array<double> fluidity;  // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
   Components<double> x, face_area[3];  // as in GridViews
+  Components<double> excess[3];        // [cell, 3] of find_excess(), on faces where there is any
 };
 
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const UniformViscosity&, int) { return 1; }
@@ -86,31 +87,45 @@ KOKKOS_FORCEINLINE_FUNCTION double face_viscosity(const VaryingViscosity& v, con
   return kind(beyond) == NodeKind::boundary ? v.relative(beyond) : mean_viscosity(v, c, beyond);
 }
 
-/// What a viscosity that varies adds to the viscous force on cell c, over the uniform one: div(r (grad u + grad u^T)) less
-/// div grad u. Where r = least = 1 that is nothing.
+/// Whether that viscosity on a face adds anything to the uniform one's flux.
+KOKKOS_FORCEINLINE_FUNCTION bool exceeds(const VaryingViscosity& v, double on_face) { return on_face != 1 || v.least != 1; }
+
+/// excess_flux() of u on the faces of owned cells, into v.excess: once for the two cells of each.
 template <class Velocity>
-KOKKOS_INLINE_FUNCTION Vec3 excess_force(const VaryingViscosity& v, const Velocity& u, const Array<NodeKind>& kind,
-                                         const IndexSpace& index, int c) {
+void find_excess(const UniformViscosity&, const Velocity&, const Array<NodeKind>&, const IndexSpace&) {}
+template <class Velocity>
+void find_excess(const VaryingViscosity& viscosity, const Velocity& velocity, const Array<NodeKind>& kinds, const IndexSpace& of_cells) {
+  const VaryingViscosity v = viscosity;
+  const Velocity u = velocity;
+  const Array<NodeKind> kind = kinds;
+  const IndexSpace index = of_cells;
+  for (int d = 0; d < 3; ++d) {
+    const Components<double> excess = v.excess[d];
+    std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
+    upper[d] += 1;
+    for_box("corpuscle::fluid::excess_flux", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+      const int c = index.cell(i, j, k), low = c - index.stride(d);
+      const double r = kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c);
+      if (exceeds(v, r)) store(excess, c, excess_flux(v, r, u, index, d, c));
+    });
+  }
+}
+
+/// image -= what a viscosity that varies adds to the viscous force on cell c, over the uniform one: div(r (grad u + grad u^T)) less
+/// div grad u. After find_excess().
+template <class Image>
+KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const UniformViscosity&, const Array<NodeKind>&, const IndexSpace&, int, Image&) {}
+template <class Image>
+KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const VaryingViscosity& v, const Array<NodeKind>& kind, const IndexSpace& index, int c,
+                                                 Image& image) {
   Vec3 force;
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {
-      const int s = index.stride(d), face = end == 0 ? c : c + s;
-      const double here = face_viscosity(v, kind, c, end == 0 ? c - s : c + s);
-      if (here == 1 && v.least == 1) continue;
-      force += (end == 0 ? -1.0 : 1.0) * excess_flux(v, here, u, index, d, face);
+      const int s = index.stride(d);
+      if (!exceeds(v, face_viscosity(v, kind, c, end == 0 ? c - s : c + s))) continue;
+      force += (end == 0 ? -1.0 : 1.0) * load(v.excess[d], end == 0 ? c : c + s);
     }
-  return force;
-}
-
-/// image -= what the viscosity adds to the uniform one's force.
-template <class Image, class Velocity>
-KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const UniformViscosity&, const Velocity&, const Array<NodeKind>&,
-                                                 const IndexSpace&, int, Image&) {}
-template <class Image, class Velocity>
-KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const VaryingViscosity& v, const Velocity& u, const Array<NodeKind>& kind,
-                                                 const IndexSpace& index, int c, Image& image) {
-  const Vec3 excess = excess_force(v, u, kind, index, c);
-  for (int m = 0; m < 3; ++m) image[m] -= excess[m];
+  for (int m = 0; m < 3; ++m) image[m] -= force[m];
 }
 
 }  // namespace corpuscle

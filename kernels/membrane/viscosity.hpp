@@ -41,12 +41,14 @@ struct FullDamping {
 
 /// Work arrays that exist only with membrane viscosity.
 struct ViscosityViews {
-  Table<double> along;                         // [ring entry, 3] unit vector to the neighbour
+  Array<int> neighbour;                        // [ring entry] vertex that it leads to
+  Array<double> inverse_length;                // [ring entry] 1/um, of the edge to it
   Array<double> diagonal;                      // [vertex] M/dt + beta A, pg/us
   Table<double> block;                         // [vertex, 6] inverse of the diagonal 3x3 block
   Components<double> right_side;               // [vertex, 3] nN
   Components<double> gradient;                 // [vertex, 3] dV/dx, um2
   Components<double> residual, search, image;  // [vertex, 3]
+  Components<double> inverse_gradient;         // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
   Array<int> iterations;                       // [cell] of the last velocity solve; negative if it did not converge
 };
 
@@ -56,14 +58,14 @@ KOKKOS_INLINE_FUNCTION int ring_vertex(const SurfaceSet& s, int r) {
   return s.triangle(s.ring_triangle(r), k == 2 ? 0 : k + 1);
 }
 
-/// D v at vertex i: minus the dissipative force, nN.
+/// D v at vertex i of membranes at s.x: minus the dissipative force, nN.
 template <class Damping, class Velocity>
-KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const Table<double>& along, const CellLaw& law,
-                                       const Velocity& v, int i) {
-  const Vec3 own = load(v, i);
+KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const ViscosityViews& w, const CellLaw& law, const Velocity& v, int i) {
+  const Vec3 own = load(v, i), here = load(s.x, i);
   Vec3 sum;
   for (int r = s.ring_start(i); r < s.ring_start(i + 1); ++r) {
-    sum += Damping::force(law, own - load(v, ring_vertex(s, r)), load(along, r));
+    const int j = w.neighbour(r);
+    sum += Damping::force(law, own - load(v, j), w.inverse_length(r) * (load(s.x, j) - here));
   }
   return sum;
 }
@@ -100,9 +102,12 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
         Symmetric3 b;
         const int first = m.surface.ring_start(i), last = m.surface.ring_start(i + 1);
         for (int r = first; r < last; ++r) {
-          Vec3 e = load(x, ring_vertex(m.surface, r)) - load(x, i);
-          e *= 1 / norm(e);
-          store(w.along, r, e);
+          const int j = ring_vertex(m.surface, r);
+          Vec3 e = load(x, j) - load(x, i);
+          const double inverse_length = 1 / norm(e);
+          e *= inverse_length;
+          w.neighbour(r) = j;
+          w.inverse_length(r) = inverse_length;
           const double c = law.central_damping;
           b.xx += c * e.x * e.x, b.yy += c * e.y * e.y, b.zz += c * e.z * e.z;
           b.xy += c * e.x * e.y, b.xz += c * e.x * e.z, b.yz += c * e.y * e.z;
@@ -115,14 +120,11 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
       });
 }
 
-/// Conjugate gradients with block Jacobi on one cell, by one team.
+/// The matrix of one cell, beta A + D (+ M/dt), and block Jacobi for it; sums over the cell by one team.
 template <class Damping>
-struct ViscousSolve {
+struct ViscousMatrix {
   MembraneViews m;
   ViscosityViews w;
-  Components<double> right_side, solution;  // [vertex, 3]; the solution also holds the first guess
-  double tolerance;  // of the residual over the right-hand side, both in the preconditioner's norm
-  int max_iterations;
 
   KOKKOS_INLINE_FUNCTION Vec3 precondition(int i, const Vec3& r) const {
     const Symmetric3 b{w.block(i, 0), w.block(i, 1), w.block(i, 2), w.block(i, 3), w.block(i, 4), w.block(i, 5)};
@@ -131,7 +133,7 @@ struct ViscousSolve {
 
   template <class Velocity>
   KOKKOS_INLINE_FUNCTION Vec3 apply(const CellLaw& law, const Velocity& v, int i) const {
-    return w.diagonal(i) * load(v, i) + damping_at<Damping>(m.surface, w.along, law, v, i);
+    return w.diagonal(i) * load(v, i) + damping_at<Damping>(m.surface, w, law, v, i);
   }
 
   template <class Term>
@@ -143,45 +145,23 @@ struct ViscousSolve {
     return total;
   }
 
-  KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
-    const int cell = team.league_rank();
-    const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);
-    const CellLaw law = m.law(m.type(cell));
-    const double scale = sum(team, first, last, [&](int i) {
-      const Vec3 b = load(right_side, i);
-      return dot(b, precondition(i, b));
-    });
-    double rz = sum(team, first, last, [&](int i) {
-      const Vec3 r = load(right_side, i) - apply(law, solution, i);
-      const Vec3 z = precondition(i, r);
-      store(w.residual, i, r);
-      store(w.search, i, z);
-      return dot(r, z);
-    });
-    const double target = tolerance * tolerance * scale;
-    int iteration = 0;
-    while (rz > target && iteration < max_iterations) {
-      const double curvature = sum(team, first, last, [&](int i) {
-        const Vec3 q = apply(law, w.search, i);
-        store(w.image, i, q);
-        return dot(load(w.search, i), q);
-      });
-      const double alpha = rz / curvature;
-      const double next = sum(team, first, last, [&](int i) {
-        store(solution, i, load(solution, i) + alpha * load(w.search, i));
-        const Vec3 r = load(w.residual, i) - alpha * load(w.image, i);
-        store(w.residual, i, r);
-        return dot(r, precondition(i, r));
-      });
-      const double ratio = next / rz;
-      rz = next;
-      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last), [&](int i) {
-        store(w.search, i, precondition(i, load(w.residual, i)) + ratio * load(w.search, i));
-      });
-      team.team_barrier();
-      ++iteration;
-    }
-    const bool converged = rz <= target;
+  /// Of both terms that term(i, sums) adds.
+  template <class Term>
+  KOKKOS_INLINE_FUNCTION Sums<2> both(const SectionTeam& team, int first, int last, const Term& term) const {
+    Sums<2> total;
+    Kokkos::parallel_reduce(
+        Kokkos::TeamThreadRange(team, first, last), [&](int i, Sums<2>& part) { term(i, part); }, total);
+    team.team_barrier();
+    return total;
+  }
+
+  template <class Work>
+  KOKKOS_INLINE_FUNCTION void each(const SectionTeam& team, int first, int last, const Work& work) const {
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last), work);
+    team.team_barrier();
+  }
+
+  KOKKOS_INLINE_FUNCTION void finish(const SectionTeam& team, int cell, int iteration, bool converged) const {
     Kokkos::single(Kokkos::PerTeam(team), [&]() {
       w.iterations(cell) = converged ? iteration : -iteration;
       if (!converged) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
@@ -189,14 +169,144 @@ struct ViscousSolve {
   }
 };
 
+/// Conjugate gradients on one cell, by one team.
+template <class Damping>
+struct ViscousSolve : ViscousMatrix<Damping> {
+  Components<double> right_side, solution;  // [vertex, 3]; the solution also holds the first guess
+  double tolerance;  // of the residual over the right-hand side, both in the preconditioner's norm
+  int max_iterations;
+
+  KOKKOS_INLINE_FUNCTION ViscousSolve(const ViscousMatrix<Damping>& matrix, const Components<double>& b, const Components<double>& x,
+                                      double share, int most)
+      : ViscousMatrix<Damping>(matrix), right_side(b), solution(x), tolerance(share), max_iterations(most) {}
+
+  KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
+    const MembraneViews& m = this->m;
+    const ViscosityViews& w = this->w;
+    const int cell = team.league_rank();
+    const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);
+    const CellLaw law = m.law(m.type(cell));
+    const double scale = this->sum(team, first, last, [&](int i) {
+      const Vec3 b = load(right_side, i);
+      return dot(b, this->precondition(i, b));
+    });
+    double rz = this->sum(team, first, last, [&](int i) {
+      const Vec3 r = load(right_side, i) - this->apply(law, solution, i);
+      const Vec3 z = this->precondition(i, r);
+      store(w.residual, i, r);
+      store(w.search, i, z);
+      return dot(r, z);
+    });
+    const double target = tolerance * tolerance * scale;
+    int iteration = 0;
+    while (rz > target && iteration < max_iterations) {
+      const double curvature = this->sum(team, first, last, [&](int i) {
+        const Vec3 q = this->apply(law, w.search, i);
+        store(w.image, i, q);
+        return dot(load(w.search, i), q);
+      });
+      const double alpha = rz / curvature;
+      const double next = this->sum(team, first, last, [&](int i) {
+        store(solution, i, load(solution, i) + alpha * load(w.search, i));
+        const Vec3 r = load(w.residual, i) - alpha * load(w.image, i);
+        store(w.residual, i, r);
+        return dot(r, this->precondition(i, r));
+      });
+      const double ratio = next / rz;
+      rz = next;
+      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last), [&](int i) {
+        store(w.search, i, this->precondition(i, load(w.residual, i)) + ratio * load(w.search, i));
+      });
+      team.team_barrier();
+      ++iteration;
+    }
+    this->finish(team, cell, iteration, rz <= target);
+  }
+};
+
+/// The same for velocities that change no volume: g . v = 0 with g = w.gradient, for any pressure inside. Residuals and directions
+/// are kept to that (projected conjugate gradients: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23, 2001), so that the pressure
+/// costs no solve of its own. m.surface.v holds the first guess and the solution.
+template <class Damping>
+struct HeldViscousSolve : ViscousMatrix<Damping> {
+  double tolerance;                     // as ViscousSolve
+  int max_iterations;
+
+  KOKKOS_INLINE_FUNCTION HeldViscousSolve(const ViscousMatrix<Damping>& matrix, double share, int most)
+      : ViscousMatrix<Damping>(matrix), tolerance(share), max_iterations(most) {}
+
+  KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
+    const MembraneViews& m = this->m;
+    const ViscosityViews& w = this->w;
+    const Components<double>&v = m.surface.v, &h = w.inverse_gradient;
+    const int cell = team.league_rank();
+    const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);
+    const CellLaw law = m.law(m.type(cell));
+    const Sums<2> of_gradient = this->both(team, first, last, [&](int i, Sums<2>& part) {
+      const Vec3 g = load(w.gradient, i), inverse = this->precondition(i, g);
+      store(h, i, inverse);
+      part[0] += dot(g, inverse);
+      part[1] += dot(g, load(v, i));
+    });
+    const double square = of_gradient[0], excess = of_gradient[1] / square;
+    const double scale = this->sum(team, first, last, [&](int i) {
+      const Vec3 b = load(w.right_side, i);
+      store(v, i, load(v, i) - excess * load(h, i));
+      return dot(b, this->precondition(i, b));
+    });
+    double along = this->sum(team, first, last, [&](int i) {
+      const Vec3 r = load(w.right_side, i) - this->apply(law, v, i);
+      store(w.residual, i, r);
+      return dot(load(h, i), r);
+    }) / square;
+    double rz = this->sum(team, first, last, [&](int i) {
+      const Vec3 r = load(w.residual, i) - along * load(w.gradient, i), z = this->precondition(i, r);
+      store(w.residual, i, r);
+      store(w.search, i, z);
+      return dot(r, z);
+    });
+    const double target = tolerance * tolerance * scale;
+    int iteration = 0;
+    while (rz > target && iteration < max_iterations) {
+      const double curvature = this->sum(team, first, last, [&](int i) {
+        const Vec3 q = this->apply(law, w.search, i);
+        store(w.image, i, q);
+        return dot(load(w.search, i), q);
+      });
+      const double alpha = rz / curvature;
+      const Sums<2> next = this->both(team, first, last, [&](int i, Sums<2>& part) {
+        store(v, i, load(v, i) + alpha * load(w.search, i));
+        const Vec3 r = load(w.residual, i) - alpha * load(w.image, i);
+        store(w.residual, i, r);
+        part[0] += dot(r, this->precondition(i, r));
+        part[1] += dot(load(h, i), r);
+      });
+      along = next[1] / square;
+      const double projected = next[0] - along * next[1], ratio = projected / rz;
+      rz = projected;
+      this->each(team, first, last, [&](int i) {
+        const Vec3 r = load(w.residual, i) - along * load(w.gradient, i);
+        store(w.residual, i, r);
+        store(w.search, i, this->precondition(i, r) + ratio * load(w.search, i));
+      });
+      ++iteration;
+    }
+    this->finish(team, cell, iteration, rz <= target);
+    const double left = this->sum(team, first, last, [&](int i) { return dot(load(w.gradient, i), load(v, i)); }) / square;
+    this->each(team, first, last, [&](int i) { store(v, i, load(v, i) - left * load(h, i)); });
+  }
+};
+
+constexpr double viscous_tolerance = 1e-8;  // far below the truncation error of the step; the volume does not depend on it
+// A cell of n vertices has 3 n unknowns; more iterations mean a matrix that is no longer positive definite (not a number somewhere).
+constexpr int viscous_iterations = 5000;
+
 /// Solve for `solution`, which holds the first guess.
 template <class Damping>
 void solve_viscous(const MembraneViews& m, const ViscosityViews& w, const Components<double>& right_side,
                    const Components<double>& solution) {
-  // 1e-8: far below the truncation error of the step; the volume does not depend on it. A cell of n vertices has 3 n
-  // unknowns; more iterations than 5000 mean a matrix that is no longer positive definite (not a number somewhere).
   Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
-                       ViscousSolve<Damping>{m, w, right_side, solution, 1e-8, 5000});
+                       ViscousSolve<Damping>({m, w}, right_side, solution, viscous_tolerance, viscous_iterations));
 }
 
 /// The velocity and the answer to a uniform pressure, both with the full left-hand side.
@@ -224,27 +334,24 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
-/// v without any change of volume, after predict_viscous_velocity(). A fluid that cannot be compressed answers to a pressure inside
-/// with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
-inline void keep_volume(const MembraneViews& m, const MotionViews& motion) {
-  const auto v = m.surface.v;
-  for_sections(
-      "corpuscle::membrane::keep_volume", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
-        const double factor = -section_total(motion.sums, cell, 0) / section_total(motion.sums, cell, 1);
-        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
-                             [&](int i) { store(v, i, load(v, i) + factor * load(motion.direction, i)); });
-      });
+/// The velocity under whatever pressure inside keeps the volume. A fluid that cannot be compressed answers to such a pressure with no
+/// velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
+template <class Damping, class Load>
+void predict_held_velocity(const MembraneViews& m, const ViscosityViews& w, const Load& outside, double dt) {
+  assemble_viscous<Damping>(m, w, outside, dt);
+  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
+                       HeldViscousSolve<Damping>({m, w}, viscous_tolerance, viscous_iterations));
 }
 
 /// damping = D v, which is taken off m.force and, if it is another array, off `force`.
 template <class Damping>
-void subtract_damping(const MembraneViews& m, const Table<double>& along, const Components<double>& v,
+void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v,
                       const Components<double>& force, const Components<double>& damping) {
   const bool two = force.data() != m.force.data();
   Kokkos::parallel_for(
       "corpuscle::membrane::subtract_damping", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
-        const Vec3 taken = damping_at<Damping>(m.surface, along, law, v, i);
+        const Vec3 taken = damping_at<Damping>(m.surface, w, law, v, i);
         store(damping, i, taken);
         store(m.force, i, load(m.force, i) - taken);
         if (two) store(force, i, load(force, i) - taken);
@@ -253,12 +360,11 @@ void subtract_damping(const MembraneViews& m, const Table<double>& along, const 
 
 /// D v for given velocities, into `force` with its sign: the dissipative force on each vertex, nN.
 template <class Damping>
-void dissipative_force(const MembraneViews& m, const Components<double>& v, const Table<double>& along,
-                       const Components<double>& force) {
+void dissipative_force(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v, const Components<double>& force) {
   Kokkos::parallel_for(
       "corpuscle::membrane::dissipative_force", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
-        store(force, i, -damping_at<Damping>(m.surface, along, law, v, i));
+        store(force, i, -damping_at<Damping>(m.surface, w, law, v, i));
       });
 }
 

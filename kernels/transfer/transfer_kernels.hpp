@@ -64,6 +64,39 @@ KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const do
   return DualBasis(seen[0], seen[1], seen[2]);
 }
 
+/// Whether a marker reaches beyond a side, so that its weights are folded back.
+template <class Delta>
+KOKKOS_INLINE_FUNCTION bool is_folded(const TransferBlock& block, const double (&eta)[3]) {
+  bool folded = false;
+  for (int e = 0; e < 3; ++e)
+    folded = folded || (block.lattice.boundary_below[e] && eta[e] < Delta::reach) ||
+             (block.lattice.boundary_above[e] && eta[e] > block.index().n[e] - 1 - Delta::reach);
+  return folded;
+}
+
+/// The same as seen_areas() of its place, with the weights that it has.
+template <class Delta>
+KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const MarkerViews& m, int marker, const double (&eta)[3]) {
+  if (is_folded<Delta>(block, eta)) return seen_areas<Delta>(block, eta);
+  constexpr int points = Delta::points;
+  Vec3 seen[3];
+  for (int d = 0; d < 3; ++d) {
+    int line[3];
+    for (int e = 0; e < 3; ++e) line[e] = e == d ? 3 + e : e;
+    Vec3 sum;
+    for (int k = 0; k < points; ++k)
+      for (int j = 0; j < points; ++j)
+        for (int i = 0; i < points; ++i) {
+          const int row[3] = {m.base(marker, line[0]) + i, m.base(marker, line[1]) + j, m.base(marker, line[2]) + k};
+          const double w = m.weight(marker, line[0] * points + i) * m.weight(marker, line[1] * points + j) * m.weight(marker, line[2] * points + k);
+          const int c = block.index().cell(row[0], row[1], row[2]);
+          sum += w * (points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c));
+        }
+    seen[d] = sum;
+  }
+  return DualBasis(seen[0], seen[1], seen[2]);
+}
+
 /// base and weight of every marker. Weights of points beyond a side are folded back: reflected where the side gives
 /// the velocity (no slip is then exact, and a force keeps its moment about the wall, which takes the rest of it), added where
 /// it gives the derivative.
@@ -98,7 +131,7 @@ void resolve_forces(const TransferBlock& transfer_block, const MarkerViews& mark
   Kokkos::parallel_for(
       "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        const DualBasis dual = seen_areas<Delta>(block, eta);
+        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
         const Vec3 f = load(force, m.vertex(marker));
         for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
       });
@@ -146,10 +179,14 @@ void spread_forces(const TransferBlock& block, const MarkerViews& markers, const
             for (int s = m.start(line); s < end; ++s) {
               const int marker = m.order(s);
               double w[6];
-              for (int e = 0; e < 6; ++e) {
-                const int p = at[e % 3] - m.base(marker, e);
-                w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
-              }
+              const auto reached = [&](int d) {  // along d, by cells or faces
+                for (int e = d; e < 6; e += 3) {
+                  const int p = at[d] - m.base(marker, e);
+                  w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
+                }
+                return w[d] != 0 || w[d + 3] != 0;
+              };
+              if (!reached(2) || !reached(1) || !reached(0)) continue;
               sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
               sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
               sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
@@ -213,11 +250,8 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
         constexpr int points = Delta::points;
         const IndexSpace& index = block.index();
         const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        bool folded = false;
-        for (int e = 0; e < 3; ++e)
-          folded = folded || (block.lattice.boundary_below[e] && eta[e] < Delta::reach) ||
-                   (block.lattice.boundary_above[e] && eta[e] > index.n[e] - 1 - Delta::reach);
-        const DualBasis dual = seen_areas<Delta>(block, eta);
+        const bool folded = is_folded<Delta>(block, eta);
+        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
         Vec3 part;
         for (int d = 0; d < 3; ++d) {
           double sum = 0;

@@ -59,10 +59,7 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
   else
     viscous_coefficients<false>(grid.views(), g_);
   hierarchy_ = std::make_unique<MultigridHierarchy>(grid, g_.normal);
-  momentum_ = std::make_unique<Momentum>(*hierarchy_, n);
-  for (auto& level : momentum_->cycle.levels())
-    for (int d = 0; d < 3; ++d)
-      for (int side = 0; side < 2; ++side) level.views.closed[d][side] = !level.views.shared[d][side];
+  make_momentum(*hierarchy_);
   pressure_cycle_ = std::make_unique<PressureCycle>(*hierarchy_);
   if (skewed_) {
     psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
@@ -76,6 +73,23 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
         std::make_unique<PressureMultigrid>(*hierarchy_, *pressure_cycle_, g_.normal, settings.max_iterations);
   }
   update_pressure_equation();
+}
+
+void FluidSolver::make_momentum(MultigridHierarchy& hierarchy) {
+  momentum_ = std::make_unique<Momentum>(hierarchy, grid_->index().size());
+  for (auto& level : momentum_->cycle.levels())
+    for (int d = 0; d < 3; ++d)
+      for (int side = 0; side < 2; ++side) level.views.closed[d][side] = !level.views.shared[d][side];
+}
+
+void FluidSolver::set_viscosity(const Array<double>& relative, double least, const Array<double>& fluidity) {
+  fluidity_ = fluidity;
+  relative_viscosity_ = relative;
+  least_viscosity_ = least;
+  for (auto& excess : excess_) excess = Components<double>(uninitialised("corpuscle::fluid::excess_flux"), grid_->index().size(), 3);
+  momentum_.reset();
+  viscous_hierarchy_ = std::make_unique<MultigridHierarchy>(*grid_, g_.normal);
+  make_momentum(*viscous_hierarchy_);
 }
 
 void FluidSolver::update_pressure_equation() {

@@ -80,11 +80,7 @@ class FluidSolver {
   /// the boundary's. Shared: what is written into it counts from the next solve. Without this call there is one viscosity.
   /// @param least     not above any value that it will have, nor above 1
   /// @param fluidity  [cell] where cells hold two fluids, the mean of the inverse of what `relative` is the mean of; shared
-  void set_viscosity(const Array<double>& relative, double least = 1, const Array<double>& fluidity = {}) {
-    fluidity_ = fluidity;
-    relative_viscosity_ = relative;
-    least_viscosity_ = least;
-  }
+  void set_viscosity(const Array<double>& relative, double least = 1, const Array<double>& fluidity = {});
   /// Without values where there is one viscosity.
   const Array<double>& relative_viscosity() const { return relative_viscosity_; }
   /// Calls `use` with the viscosity if it varies.
@@ -93,7 +89,8 @@ class FluidSolver {
     const GridViews& grid = grid_->views();
     if (relative_viscosity_.data())
       use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, grid.x,
-                           {grid.face_area[0], grid.face_area[1], grid.face_area[2]}});
+                           {grid.face_area[0], grid.face_area[1], grid.face_area[2]},
+                           {excess_[0], excess_[1], excess_[2]}});
   }
 
   /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
@@ -119,6 +116,7 @@ class FluidSolver {
   void restore(const FluidState& state);
 
  private:
+  void make_momentum(MultigridHierarchy& hierarchy);
   void update_pressure_equation();
   void update_diagonal();
   void fill_halos(const Components<double>& u);
@@ -177,6 +175,7 @@ class FluidSolver {
   PressureMask mask_;
   Array<double> relative_viscosity_;  // empty: one viscosity
   Array<double> fluidity_;            // empty: no cell holds two fluids
+  Components<double> excess_[3];      // [cell, 3] on faces, um2/us times the viscosity that varies; only then
   double least_viscosity_ = 1;
   ViscousCoefficients g_;
   double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()
@@ -185,7 +184,7 @@ class FluidSolver {
   Table<double> body_sums_;
   HostCopy<Table<double>> body_sums_host_;
   HostCopy<Array<double>> growth_host_;
-  std::unique_ptr<MultigridHierarchy> hierarchy_;
+  std::unique_ptr<MultigridHierarchy> hierarchy_, viscous_hierarchy_;  // the velocity's own, if its viscosity varies
   /// What the momentum equation's corrections need, [cell, 3] in single precision: implicit convection, cross terms and
   /// immersed rows make the operator unsymmetric, so BiCGStab, preconditioned by a multigrid cycle.
   struct Momentum {

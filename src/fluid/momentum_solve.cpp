@@ -175,8 +175,12 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
       iterations, residual_norm_ / scale, start / scale, target / scale, cause));
 }
 
-/// The cycle's equation for the present mass and node kinds, where they changed; after the hierarchy's update.
+/// The cycle's equation for the present mass, node kinds and viscosity, where they changed; after the hierarchy's update.
 void FluidSolver::update_momentum_cycle() {
+  visit_varying_viscosity([this](const VaryingViscosity& viscosity) {
+    viscous_hierarchy_->update(mask_, viscosity);
+    momentum_->stale = true;
+  });
   if (!momentum_->stale) return;
   momentum_->stale = false;
   momentum_->depth = momentum_depth();

@@ -107,8 +107,12 @@ void MultigridHierarchy::coarsen(std::size_t number) {
 }
 
 void MultigridHierarchy::update(const PressureMask& mask) {
-  Level& finest = levels_[0];
-  mask_conductances(coefficient_, mask, finest.views);
+  mask_conductances(coefficient_, mask, levels_[0].views);
+  for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
+}
+
+void MultigridHierarchy::update(const PressureMask& mask, const VaryingViscosity& viscosity) {
+  mask_conductances(coefficient_, mask, levels_[0].views, viscosity);
   for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
 }
 

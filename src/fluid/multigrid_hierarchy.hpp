@@ -30,6 +30,8 @@ class MultigridHierarchy {
 
   /// Take over which nodes have a pressure; the mask's halo must be valid.
   void update(const PressureMask& mask);
+  /// The same with conductances that are larger by a viscosity, which changes.
+  void update(const PressureMask& mask, const VaryingViscosity& viscosity);
 
   std::vector<Level>& levels() { return levels_; }
   const Comm& comm() const { return grid_->comm(); }

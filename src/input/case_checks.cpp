@@ -60,13 +60,9 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
 /// Cells that the program places.
 void check_populations(const Case& scene, const Complaint& complain) {
   for (std::size_t p = 0; p < scene.populations.size(); ++p) {
-    const CellSettings& cell = scene.cell_types[scene.populations[p].type].cell;
     if (scene.coupling->scheme != CouplingSettings::Scheme::force)
       complain(fmt::format("populations.{}", p), "",
                "cells are packed only as membranes that are forces: set coupling.scheme = \"force\", or place them one by one in [[cells]]");
-    if (cell.membrane_viscosity_N_s_per_m > 0)
-      complain(fmt::format("cell_types.{}", cell.type), "membrane_viscosity_N_s_per_m",
-               "must be 0 with coupling.scheme = \"force\": it has no membrane viscosity yet");
   }
 }
 

@@ -49,7 +49,6 @@ void MembraneViscosity::hold(const MembraneViews& m) {
   extend(given_, "given_vertex", m.vertices);
   extend(views_.right_side, "right_side_vertex", m.vertices);
   grow(views_.iterations, "iterations_cell", m.cells);
-  make_room(m);
 }
 
 Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)

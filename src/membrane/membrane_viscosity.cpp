@@ -13,39 +13,33 @@ namespace {
 
 auto label(const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); }
 
-std::size_t scratch_numbers(const MembraneViews& m, bool drifting) {
-  return 9 * static_cast<std::size_t>(m.triangles) + (drifting ? 22 : 19) * static_cast<std::size_t>(m.vertices);
+std::size_t scratch_numbers(const MembraneViews& m) {
+  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles);
+  return entries + (entries + 1) / 2 + 22 * static_cast<std::size_t>(m.vertices);
 }
 
 }  // namespace
 
 void MembraneViscosity::make_room(const MembraneViews& m) {
-  const bool drifting = given_.data();
-  const std::size_t numbers = scratch_numbers(m, drifting);
-  if (!scratch_.data() || scratch_.extent(0) < numbers) {
-    scratch_ = Array<double>();  // free before taking more
-    scratch_ = Array<double>(label("viscous_scratch"), numbers + (drifting ? numbers / 16 : 0));
-  }
-  divide_scratch(m);
-  if (drifting) return;
+  scratch_ = Array<double>(label("viscous_scratch"), scratch_numbers(m));
+  divide_scratch(m, scratch_.data());
   views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
 }
 
-void MembraneViscosity::divide_scratch(const MembraneViews& m) {
+void MembraneViscosity::divide_scratch(const MembraneViews& m, double* memory) {
   const std::size_t vertices = m.vertices, entries = 3 * static_cast<std::size_t>(m.triangles);
-  double* memory = scratch_.data();
   const auto take = [&](std::size_t numbers) {
     double* from = memory;
     memory += numbers;
     return from;
   };
-  views_.along = Table<double>(take(3 * entries), entries, 3);
+  views_.inverse_length = Array<double>(take(entries), entries);
+  views_.neighbour = Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries);
   views_.diagonal = Array<double>(take(vertices), vertices);
   views_.block = Table<double>(take(6 * vertices), vertices, 6);
-  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image})
+  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image, &views_.inverse_gradient})
     *vectors = Components<double>(take(3 * vertices), vertices, 3);
-  if (given_.data()) direction_ = Components<double>(take(3 * vertices), vertices, 3);
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -54,32 +48,27 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   elasticity.evaluate_triangles(m, m.surface.x);
   if (tangential_) {
     assemble_viscous<FullDamping>(m, views_, NoLoad{}, 1);
-    dissipative_force<FullDamping>(m, v, views_.along, force);
+    dissipative_force<FullDamping>(m, views_, v, force);
   } else {
     assemble_viscous<CentralDamping>(m, views_, NoLoad{}, 1);
-    dissipative_force<CentralDamping>(m, v, views_.along, force);
+    dissipative_force<CentralDamping>(m, views_, v, force);
   }
 }
 
 template <class Damping>
-void MembraneViscosity::resist_with(const MembraneViews& m, const MotionViews& motion, double beta,
-                                    const Components<double>& force) const {
+void MembraneViscosity::resist_with(const MembraneViews& m, double beta, const Components<double>& force) const {
   constexpr double massless = 1e300;  // us: mass over it
-  predict_viscous_velocity<Damping>(m, motion, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
-  keep_volume(m, motion);
-  subtract_damping<Damping>(m, views_.along, m.surface.v, force, views_.right_side);
+  predict_held_velocity<Damping>(m, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
+  subtract_damping<Damping>(m, views_, m.surface.v, force, views_.right_side);
   copy_vertices(m.vertices, force, given_);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, const MotionViews& of_membranes, double beta,
-                               const Components<double>& force) const {
-  MotionViews motion = of_membranes;
-  motion.direction = direction_;
-  Kokkos::deep_copy(Exec(), direction_, 0.0);  // so that a step depends on the state alone
+void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force) {
+  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
   if (tangential_)
-    resist_with<FullDamping>(m, motion, beta, force);
+    resist_with<FullDamping>(m, beta, force);
   else
-    resist_with<CentralDamping>(m, motion, beta, force);
+    resist_with<CentralDamping>(m, beta, force);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

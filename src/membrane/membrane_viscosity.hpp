@@ -1,6 +1,7 @@
 // Which form of membrane viscosity the cells need, decided once at set-up.
 #pragma once
 
+#include "core/workspace.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/viscosity.hpp"
 
@@ -27,7 +28,7 @@ class MembraneViscosity {
   /// See Membranes::resist(): solves (beta A + D) v = beta A U + F - given + q dV/dx for m.surface.v, which holds U, with the
   /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then. The triangle geometry must be
   /// current.
-  void resist(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
+  void resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force);
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -40,14 +41,13 @@ class MembraneViscosity {
   int iterations() const;
 
  private:
-  void divide_scratch(const MembraneViews& m);
+  void divide_scratch(const MembraneViews& m, double* memory);
   template <class Damping>
-  void resist_with(const MembraneViews& m, const MotionViews& motion, double beta, const Components<double>& force) const;
+  void resist_with(const MembraneViews& m, double beta, const Components<double>& force) const;
 
   bool tangential_;
   Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
-  Array<double> scratch_;
-  Components<double> direction_;  // [vertex, 3] of the solver of q; only with hold()
+  Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
 };
 

@@ -133,7 +133,7 @@ void Membranes::compute_forces() {
 void Membranes::resist(double beta, const Components<double>& force) {
   if (!viscosity_ || views_.cells == 0) return;
   Kokkos::deep_copy(views_.status, 0);
-  viscosity_->resist(views_, motion_, beta, force);
+  viscosity_->resist(views_, *workspace_, beta, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 

@@ -99,7 +99,7 @@ class Membranes {
   void compute_forces();
   /// Of membranes that move with a fluid, once `force` holds all that acts on the fluid but membrane viscosity (views().force, or
   /// that and what else acts), [vertex, 3] nN: take what that resists, as the fluid will move them, off `force` and views().force.
-  /// Uses none of the workspace. surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
+  /// Uses the workspace. surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
   /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
   ///              deformations; twice that is too much
   void resist(double beta, const Components<double>& force);

@@ -110,12 +110,22 @@ void Transfer::make_room(int markers) {
     markers_.base = make<Table<short>>("marker_base", room_, 6);
     markers_.order = make<Array<int>>("marker_order", room_);
   }
+}
+
+/// The markers' weights, which no one needs who has the workspace before.
+void Transfer::weigh() {
+  if (weighed_) return;
+  weighed_ = true;
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
   const auto rows = static_cast<std::size_t>(room_);
   double* memory = workspace_->reserve((6 * points + 3) * rows);
   markers_.weight = Table<double>(memory, rows, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
+  with_kernel([&](auto delta) {
+    prepare_markers<decltype(delta)>(block_, markers_);
+    mark_near<decltype(delta)>(block_, markers_);
+  });
 }
 
 int Transfer::place(const Components<double>& x) {
@@ -126,10 +136,7 @@ int Transfer::place(const Components<double>& x) {
   if (again) number_markers(places_, markers_, room_);
   fill_markers(search_, places_, markers_);
   sort_markers(block_.index(), markers_);
-  with_kernel([&](auto delta) {
-    prepare_markers<decltype(delta)>(block_, markers_);
-    mark_near<decltype(delta)>(block_, markers_);
-  });
+  weighed_ = false;
   const int beyond = beyond_host_.read()(0);
   return beyond < no_vertex ? beyond : -1;
 }
@@ -156,6 +163,7 @@ void Transfer::prepare_sharpening() {
 }
 
 void Transfer::spread(const Components<double>& force) {
+  weigh();
   const bool sharp = moment_ > 0;
   const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
   with_kernel([&](auto delta) {
@@ -172,6 +180,7 @@ void Transfer::spread(const Components<double>& force) {
 
 void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                            const Components<double>& velocity) {
+  weigh();
   Kokkos::deep_copy(Exec(), velocity, 0.0);
   const bool sharp = moment_ > 0;
   for (int d = 0; d < 3 && sharp; ++d) {

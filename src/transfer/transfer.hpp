@@ -16,7 +16,7 @@ class Transfer {
  public:
   /// @param boundaries  one entry per side
   /// @param vertices    how many place() is called with
-  /// @param workspace   shared with others that do not use it between place() and interpolate()
+  /// @param workspace   shared with others that do not use it between spread() and interpolate()
   Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
            std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
@@ -56,6 +56,7 @@ class Transfer {
   void prepare_sharpening();
   void make_places(int vertices);
   void make_room(int markers);
+  void weigh();
   template <class Use>
   void with_kernel(const Use& use) const;
 
@@ -68,6 +69,7 @@ class Transfer {
   MarkerViews markers_;
   std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
+  bool weighed_ = false;  // the markers have their weights, in the workspace
   double largest_spacing_ = 0;
   FaceForce faces_;
   double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing

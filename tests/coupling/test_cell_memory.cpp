@@ -53,6 +53,13 @@ Case channel(int places, const std::vector<int>& cells) {
   return scene;
 }
 
+/// The same with all that a red cell has: its own fluid, a viscous membrane, and others that it may touch.
+Case of_blood(Case scene, bool touching) {
+  for (CellSettings& cell : scene.cells) cell.viscosity_ratio = 5, cell.membrane_viscosity_N_s_per_m = 5e-7;
+  if (touching) scene.contact = ContactSettings{};
+  return scene;
+}
+
 std::vector<int> every_place(int count) {
   std::vector<int> places(count);
   for (int n = 0; n < count; ++n) places[n] = n;
@@ -107,6 +114,20 @@ TEST_CASE("memory grows with a rank's own cells alone", "[coupling][cells][memor
   INFO(first_slope << " and " << slope << " MB a cell");
   CHECK(slope < 0.3);
   CHECK(slope == Approx(first_slope).epsilon(0.1));  // linear, up to the room that arrays have to spare
+}
+
+TEST_CASE("cytosol, membrane viscosity and slip leave a cell's memory below its bound", "[coupling][cells][memory]") {
+  if (!counted()) return;
+  const int places = 64;
+  for (bool touching : {false, true}) {
+    held_by(of_blood(channel(places, every_place(4)), touching));  // what libraries keep once they have been used
+    const Held few = held_by(of_blood(channel(places, every_place(16)), touching));
+    const Held many = held_by(of_blood(channel(places, every_place(64)), touching));
+    const double slope = (many.mb - few.mb) / (many.own + many.copies - few.own - few.copies);
+    INFO(slope << " MB a cell" << (touching ? " with contact" : ""));
+    if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{:.4f} MB a cell{}", slope, touching ? " with contact" : ""));
+    CHECK(slope < (touching ? 0.4 : 0.3));
+  }
 }
 
 TEST_CASE("a rank does not see how many cells others have", "[coupling][cells][memory][ranks]") {

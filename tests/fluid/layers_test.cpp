@@ -92,3 +92,35 @@ TEST_CASE("two layers of fluid flow as they should, and lose what drives them", 
   CHECK(fine.velocity < 0.75 * coarse.velocity);  // the largest of several places between nodes
   CHECK(fine.dissipation < 1e-6);                 // the solver's tolerance
 }
+
+TEST_CASE("a fluid that is many times as viscous in places takes few more iterations", "[fluid][viscosity]") {
+  FluidSettings settings;
+  settings.convection = FluidSettings::Convection::none;
+  settings.pressure_gradient_Pa_per_um = {-100, 0, 0};
+  const int n = 24;
+  const double h = 0.5, middle = 0.5 * n * h;
+  const auto iterations = [&](double ratio) {
+    Grid grid(Comm(), make_node_source(box({n, n, n}, {n * h, n * h, n * h})), {true, false, true});
+    FluidSolver solver(grid, settings, sides({Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic}));
+    const IndexSpace& index = grid.index();
+    const Array<double> relative("corpuscle::test::relative", index.size());
+    const auto host = Kokkos::create_mirror_view(relative);
+    for (int c = 0; c < index.size(); ++c) {
+      int at[3];
+      index.unpack(c, at[0], at[1], at[2]);
+      double square = 0;
+      for (int d = 0; d < 3; ++d) square += std::pow((at[d] + 0.5) * h - middle, 2);
+      host(c) = square < 9 ? ratio : 1;  // a ball of 3 um
+    }
+    Kokkos::deep_copy(relative, host);
+    solver.set_viscosity(relative, std::min(1.0, ratio));
+    solver.begin_step(20);  // nu dt / h^2 = 88
+    solver.solve(20, nullptr);
+    return solver.statistics().momentum_iterations;
+  };
+  const int one = iterations(1), five = iterations(5), twenty = iterations(20);
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{}, {} and {} iterations at ratios of 1, 5 and 20", one, five, twenty));
+  // The preconditioner knows of the viscosity, though not of the transpose.
+  CHECK(five < 2.5 * one);
+  CHECK(twenty < 4 * one);
+}

@@ -403,6 +403,8 @@ TEST_CASE("populations are checked") {
   require_parts(with(rbc + "count = 3\naxis = [1, 0, 0]\n"), {":16: populations.0.axis", "only orientation = \"aligned\""});
   require_parts(with(rbc + "count = 3\nlower_um = [2, 0, 0]\nupper_um = [2, 4, 4]\n"), {":17: populations.0.upper_um", "above lower_um"});
   require_parts(with(rbc + "count = 3\nhematcrit = 0.3\n"), {"populations.0.hematcrit", "did you mean 'hematocrit'?"});
+  const std::string viscous = "name = \"rbc\"\nviscosity_ratio = 5\nmembrane_viscosity_N_s_per_m = 5e-7\n";
+  REQUIRE(with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", viscous)) == "accepted");
   require_parts(with(rbc + "count = 3\n", "[[cell_types]]\nname = \"rbc\"\n[[populations]]\n"),
                 {"populations.0", "coupling.scheme = \"force\"", "[[cells]]"});
   require_parts(with(rbc + "count = 3\n", "[coupling]\nscheme = \"force\"\n[[populations]]\n"), {"populations.0.type", "no [[cell_types]]"});
