@@ -14,6 +14,7 @@ struct VaryingViscosity {
   Array<double> relative;
   double least;
   Array<double> fluidity;  // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
+  Array<double> smooth;    // [cell] of smooth_viscosity(), then
   Components<double> x, face_area[3];  // as in GridViews
   Components<double> excess[3];        // [cell, 3] of find_excess(), on faces where there is any
 };
@@ -43,6 +44,11 @@ struct FaceDifferences {
     const int s = index.stride(e);
     return e == d ? value(c) - value(low) : 0.25 * (value(c + s) - value(c - s) + value(low + s) - value(low - s));
   }
+  /// The same, across the face of as many values as along it: what is a few cells thick does not look steeper that way.
+  KOKKOS_INLINE_FUNCTION double even(const Array<double>& value, const IndexSpace& index, int e) const {
+    const int s = index.stride(e);
+    return e == d ? 0.25 * (value(c + s) + value(c) - value(low) - value(low - s)) : of(value, index, e);
+  }
 };
 
 /// Where a face lies between two fluids they lie side by side, and share what stretches along their interface, but what shears
@@ -50,9 +56,9 @@ struct FaceDifferences {
 /// that this makes.
 KOKKOS_INLINE_FUNCTION Vec3 layered_flux(const VaryingViscosity& v, double less, const FaceDifferences& face, const Vec3 (&du)[3],
                                          const IndexSpace& index, const Vec3& area) {
-  const auto relative = v.relative;
+  const auto smooth = v.smooth;
   Vec3 normal;
-  for (int e = 0; e < 3; ++e) normal += face.of(relative, index, e) * face.dual.b[e];
+  for (int e = 0; e < 3; ++e) normal += face.even(smooth, index, e) * face.dual.b[e];
   const double square = dot(normal, normal);
   if (!(square > 0)) return {};
   normal *= 1 / std::sqrt(square);
@@ -60,6 +66,25 @@ KOKKOS_INLINE_FUNCTION Vec3 layered_flux(const VaryingViscosity& v, double less,
   for (int e = 0; e < 3; ++e) shear += dot(face.dual.b[e], normal) * du[e] + dot(du[e], normal) * face.dual.b[e];
   shear -= dot(shear, normal) * normal;
   return -less * (dot(normal, area) * shear + dot(shear, area) * normal);
+}
+
+/// `relative` with weights of 1/4, 1/2, 1/4 along each direction, on owned cells and two halo layers: its gradient is across an
+/// interface that is no thicker than a cell. Differences of what is that thin are not, by up to 18 degrees, which loosens the
+/// interface of fluids as different as 1 and 20 by a fifth.
+inline void smooth_viscosity(const IndexSpace& of_cells, const Array<double>& relative, const Array<double>& smooth) {
+  const IndexSpace index = of_cells;
+  const Array<double> from = relative, out = smooth;
+  for_box("corpuscle::fluid::excess_smooth", {-2, -2, -2}, {index.n[0] + 2, index.n[1] + 2, index.n[2] + 2},
+          KOKKOS_LAMBDA(int i, int j, int k) {
+            const int c = index.cell(i, j, k);
+            double sum = 0;
+            for (int z = -1; z <= 1; ++z)
+              for (int y = -1; y <= 1; ++y)
+                for (int x = -1; x <= 1; ++x)
+                  sum += (2 - x * x) * (2 - y * y) * (2 - z * z) *
+                         from(c + x * index.stride(0) + y * index.stride(1) + z * index.stride(2));
+            out(c) = sum / 64;
+          });
 }
 
 /// (r - 1) grad u . area + (r - least) grad u^T . area on the face between c - stride(d) and c, where r is the viscosity, and what two

@@ -245,7 +245,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
   const double search = size.shared ? 29 + sharpening : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
   const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
-  const double cytosol = ratios ? 2 * 8 + 3 * 4 : 0;                    // Cytosol
+  const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 3 * 24 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;

@@ -84,6 +84,7 @@ void FluidSolver::make_momentum(MultigridHierarchy& hierarchy) {
 
 void FluidSolver::set_viscosity(const Array<double>& relative, double least, const Array<double>& fluidity) {
   fluidity_ = fluidity;
+  smooth_viscosity_ = fluidity.data() ? Array<double>("corpuscle::fluid::smooth_viscosity", grid_->index().size()) : Array<double>();
   relative_viscosity_ = relative;
   least_viscosity_ = least;
   for (auto& excess : excess_) excess = Components<double>(uninitialised("corpuscle::fluid::excess_flux"), grid_->index().size(), 3);
@@ -341,6 +342,7 @@ void FluidSolver::solve_and_project(const EmbeddedBodies* bodies, double residua
 
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   if (relative_viscosity_.data()) update_diagonal();  // with what it is now
+  if (fluidity_.data()) smooth_viscosity(grid_->index(), relative_viscosity_, smooth_viscosity_);
   update_momentum_cycle();
   assemble_history(time);
   complete_velocity(bodies);

@@ -88,7 +88,7 @@ class FluidSolver {
   void visit_varying_viscosity(const Use& use) const {
     const GridViews& grid = grid_->views();
     if (relative_viscosity_.data())
-      use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, grid.x,
+      use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, smooth_viscosity_, grid.x,
                            {grid.face_area[0], grid.face_area[1], grid.face_area[2]},
                            {excess_[0], excess_[1], excess_[2]}});
   }
@@ -175,6 +175,7 @@ class FluidSolver {
   PressureMask mask_;
   Array<double> relative_viscosity_;  // empty: one viscosity
   Array<double> fluidity_;            // empty: no cell holds two fluids
+  Array<double> smooth_viscosity_;    // where some do
   Components<double> excess_[3];      // [cell, 3] on faces, um2/us times the viscosity that varies; only then
   double least_viscosity_ = 1;
   ViscousCoefficients g_;

@@ -19,6 +19,7 @@ Cytosol::Cytosol(Grid& grid, const std::vector<double>& ratio) : grid_(&grid) {
                 Array<double>(uninitialised("corpuscle::transfer::inside_fluidity"), index.size())};
   Kokkos::deep_copy(viscosity_.relative, 1.0);
   Kokkos::deep_copy(viscosity_.fluidity, 1.0);
+  share_ = Array<double>("corpuscle::transfer::inside_share", index.size());
   broken_ = Array<int>("corpuscle::transfer::inside_broken", 1);
   broken_host_ = HostCopy(broken_);
   int lines = 0;
@@ -27,6 +28,9 @@ Cytosol::Cytosol(Grid& grid, const std::vector<double>& ratio) : grid_(&grid) {
     row_.push_back(std::make_unique<RankRow>(grid.comm(), grid.ranks_per_direction(), d));
     if (row_[d]->size() > 1) lines = std::max(lines, count_lines(index, d));
   }
+  around_.inside = inside_, around_.share = share_, around_.index = index;
+  for (int d = 0; d < 3; ++d)
+    for (int side = 0; side < 2; ++side) around_.closed[d][side] = grid.halo().neighbour(d, side) < 0;
   if (lines == 0) return;
   ends_ = Array<int>("corpuscle::transfer::inside_ends", 2 * lines);
   ends_host_ = HostCopy(ends_);
@@ -55,7 +59,10 @@ void Cytosol::update(const Transfer& transfer, const SurfaceSet& surfaces, const
       join_rows(d);
       add_up_inside(index, d, row_[d]->size() == 1, inside_.part[d], broken_);
     }
-    add_relative_viscosity(index, inside_, ratios_[m], m == 0, least_, viscosity_);
+    find_rough_share(index, inside_, share_);
+    grid_->halo().exchange(share_, 1);
+    for (const auto& part : inside_.part) grid_->halo().exchange(part, 1);
+    add_relative_viscosity(around_, ratios_[m], m == 0, least_, viscosity_);
   }
   grid_->halo().exchange(viscosity_.relative);
   grid_->halo().exchange(viscosity_.fluidity);

@@ -43,6 +43,8 @@ class Cytosol {
   double least_ = 1;
   Array<int> material_;  // [type] into ratios_; -1 for 1
   InsideViews inside_;
+  Array<double> share_;
+  CellAround around_;
   CytosolViews viscosity_;
   std::vector<std::unique_ptr<RankRow>> row_;  // [direction]
   Array<int> ends_, broken_;

@@ -78,25 +78,60 @@ struct Drop : HeldSurface {
 
 }  // namespace
 
-TEST_CASE("drops in shear deform as Taylor says", "[transfer][drop]") {
-  // Proc. R. Soc. Lond. A 146, 1934: D = Ca (19 r + 16) / (16 r + 16), r inner over outer viscosity; the next term is
-  // of order Ca^3. Approached with the relaxation time (2 r + 3) (19 r + 16) / (40 (r + 1)) Ca / rate.
-  const double ratio = GENERATE(1.0, 5.0), capillary = 0.05, length = 6;
+namespace {
+
+/// Walls at distance `length` that move along x, so that the fluid between is sheared at a rate of one.
+std::vector<BoundarySettings> shearing_walls(double length) {
   auto walls =
       sides({Type::periodic, Type::periodic, Type::moving_wall, Type::moving_wall, Type::periodic, Type::periodic});
   walls[2].velocity = Triple{-length / 2, 0, 0}, walls[3].velocity = Triple{length / 2, 0, 0};
+  return walls;
+}
+
+FluidSettings slow() {
   auto settings = stokes();
   settings.density_pg_per_um3 = 0.01, settings.kinematic_viscosity_um2_per_us = 100;  // a Reynolds number of 0.01
-  Drop drop(24, length, walls, settings, ratio);
-  const double tau = capillary * (2 * ratio + 3) * (19 * ratio + 16) / (40 * (ratio + 1)), dt = 0.01;
-  for (double t = 0; t < 4 * tau; t += dt) drop.step(t, dt, 1 / capillary);
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("the fluid in a sphere in shear is strained as another viscosity lets it be", "[transfer][drop]") {
+  // Without a tension, at first: the rate of strain inside is uniform, 5 / (2 r + 3) of that far away (Taylor, Proc. R. Soc. Lond.
+  // A 138, 1932). What bears shear across the interface counts here, from outside to inside.
+  const double ratio = GENERATE(0.2, 5.0, 20.0), length = 6, exact = 5 / (2 * ratio + 3);
+  Drop drop(36, length, shearing_walls(length), slow(), ratio);
+  drop.transfer.place(drop.surface.x);
+  drop.cytosol.update(drop.transfer, drop.surface, drop.kinds);
+  drop.settle(20, 0.1);
+  const Vec3 middle{0.03, -0.02, 0.01};
+  double slope[2] = {0, 0}, square[2] = {0, 0};  // of u over y, of v over x
+  drop.visit_cells([&](const Vec3& x, double, const Vec3& u) {
+    const Vec3 r = x - middle;
+    if (norm(r) > 0.6) return;
+    slope[0] += u.x * r.y, square[0] += r.y * r.y;
+    slope[1] += u.y * r.x, square[1] += r.x * r.x;
+  });
+  const double strain = slope[0] / square[0] + slope[1] / square[1];
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("ratio {}: rate of strain inside {:.4f}, exact {:.4f}: {:+.1f} %", ratio, strain, exact, 100 * (strain / exact - 1)));
+  CHECK(strain == Approx(exact).epsilon(0.05));  // six spacings a radius
+}
+
+TEST_CASE("drops in shear deform as Taylor and Cox say", "[transfer][drop]") {
+  // Taylor, Proc. R. Soc. Lond. A 146, 1934: D = Ca (19 r + 16) / (16 r + 16), r inner over outer viscosity; over the root of
+  // 1 + (19 r Ca / 20)^2, since a viscous drop turns before it has deformed (Cox, J. Fluid Mech. 37, 1969). Approached with the
+  // relaxation time (2 r + 3) (19 r + 16) / (40 (r + 1)) Ca / rate.
+  const double ratio = GENERATE(1.0, 5.0), capillary = 0.05, length = 8;
+  Drop drop(32, length, shearing_walls(length), slow(), ratio);
+  const double tau = capillary * (2 * ratio + 3) * (19 * ratio + 16) / (40 * (ratio + 1)), dt = 0.02;
+  for (double t = 0; t < 6 * tau; t += dt) drop.step(t, dt, 1 / capillary);
   const PrincipalAxes axes = principal_axes(body_mesh(drop.surface, 0));
   const double l = std::sqrt(axes.moment[2]), b = std::sqrt(axes.moment[0]), d = (l - b) / (l + b);
-  const double taylor = capillary * (19 * ratio + 16) / (16 * ratio + 16);
+  const double exact = capillary * (19 * ratio + 16) / (16 * ratio + 16) / std::hypot(1, 19 * ratio * capillary / 20);
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("ratio {}: D {:.4f}, Taylor {:.4f}: {:+.1f} %", ratio, d, taylor, 100 * (d / taylor - 1)));
-  // Four spacings a radius; a step of the viscosity is smeared over two.
-  CHECK(d == Approx(taylor).epsilon(ratio == 1 ? 0.03 : 0.08));
+    WARN(fmt::format("ratio {}: D {:.4f}, exact {:.4f}: {:+.1f} %", ratio, d, exact, 100 * (d / exact - 1)));
+  CHECK(d == Approx(exact).epsilon(0.03));  // four spacings a radius; walls and images lend 1 %
 }
 
 TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
@@ -108,7 +143,7 @@ TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
       sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
   auto settings = stokes();
   settings.pressure_gradient_Pa_per_um = {0, 0, 1e3 * total / std::pow(length, 3)};
-  Drop drop(24, length, all, settings, ratio);
+  Drop drop(36, length, all, settings, ratio);
   drop.set_force([&](const Vec3& x, const Vec3& area) { return (buoyancy * x.z) * area; });
   drop.transfer.place(drop.surface.x);
   drop.cytosol.update(drop.transfer, drop.surface, drop.kinds);
@@ -126,5 +161,5 @@ TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
                        4 * pi / 3 / std::pow(length, 3) * 3 * ratio / (3 * ratio + 2);
   if (std::getenv("CORPUSCLE_SHOW"))
     WARN(fmt::format("ratio {}: {:.4f}, exact {:.4f}: {:+.1f} %", ratio, speed, exact, 100 * (speed / exact - 1)));
-  CHECK(speed == Approx(exact).epsilon(0.06));
+  CHECK(speed == Approx(exact).epsilon(0.04));  // six spacings a radius; errors are of second order
 }
