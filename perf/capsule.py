@@ -3,8 +3,8 @@
 
     perf/capsule.py [--quick] [--part PART]... [--spacings N...] [--box N] [--minutes M] [--out DIR]
 
-Parts: `transients` at capillary number 0.3, as viscous inside as outside and five times as viscous, and Skalak's law at 0.6, beside a
-boundary integral (collocation on 1280 triangles, 1 %); `capillary`, numbers of 0.0375 to 0.15 to a shear of two, beside published
+Parts: `transients` at capillary number 0.3, as viscous inside as outside and five times as viscous, and Skalak's law at 0.6, beside
+a boundary integral (collocation on 1280 triangles, 1 %); `capillary`, numbers of 0.0375 to 0.15 to a shear of two, beside published
 curves; `small`, the steady deformation at 0.01, 25/12 of it whatever the viscosity inside (Barthes-Biesel, J. Fluid Mech. 100, 1980);
 `order`, three grids each 1.5 times as fine as the one before; `box`, how near walls and images may be. The first four with both
 kernels, with and without slip. Deformation is Taylor's, of the ellipsoid of equal inertia. Writes DIR/capsule.md (perf/results)
