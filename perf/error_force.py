@@ -56,7 +56,7 @@ class ForceProblem(Problem):
 
     def references(self):
         fine = self.finer if self.full else self.fine
-        return [fine | {"slip": True}, fine | {"slip": False}]
+        return [fine | {"slip": True}, fine | {"slip": False}, fine | {"slip": False, "spacing_um": self.default["spacing_um"]}]
 
     def case(self, settings):
         raise NotImplementedError
@@ -71,19 +71,19 @@ class ForceProblem(Problem):
     def finish(self, rows):
         done = [r for r in rows if r["code"] == 0]
         references = [r for r in done if r["varied"] == "reference"]
-        if len(references) < 2:
-            self.notes.append("Both references did not finish: there are no errors.")
+        if len(references) < 3:
+            self.notes.append("The references did not finish: there are no errors.")
             return
-        finest, uncorrected = references
+        finest, uncorrected, coarse = references
         for row in done:
             if row["varied"] != "reference":
                 row |= {column: self.difference(column, row, finest) for column in self.errors}
-        coarse = next((r for r in done if all(r[k] == v for k, v in (self.default | {"slip": False}).items())), None)
+        ratio = coarse["spacing_um"] / finest["spacing_um"]
         for column in self.errors:
             self.floors[column] = 0.5 * self.difference(column, finest, uncorrected)
-            if column in self.numbers and coarse:
-                there, here, ratio = coarse[self.numbers[column]], uncorrected[self.numbers[column]], coarse["spacing_um"] / finest["spacing_um"]
-                self.floors[column] = percent(finest[self.numbers[column]], here + (here - there) / (ratio - 1))
+        for column, number in self.numbers.items():
+            limit = uncorrected[number] + (uncorrected[number] - coarse[number]) / (ratio - 1)
+            self.floors[column] = percent(finest[number], limit)
         quantities = {self.quantity: self.errors[self.column]}
         note_orders(self, rows, "spacing_um", lambda h: 1 / h, quantities)
         self.floors[self.column] += note_orders(self, rows, "step_us", lambda dt: 1 / dt, quantities) or 0
