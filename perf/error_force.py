@@ -25,13 +25,15 @@ def allowed(section, key):
 
 
 class ForceProblem(Problem):
-    """Settings are keys of error_sweeps, and `spacing_um`. The reference is the mean of two runs on the finest grid, with and without
-    the slip correction. Its uncertainty is half of what lies between them, and what the finest step of the sweep leaves."""
+    """Settings are keys of error_sweeps, and `spacing_um`. The reference is the finest run with the slip correction. What is not
+    corrected falls with the first power of the spacing: the uncertainty of a number is how far the reference is from the limit of runs
+    without slip at two spacings; of a shape, half of how far it is from the finest without; and what the finest step leaves."""
     end_us = 0
     fine = {}           # of the references, --quick and --full
     finer = {}
     quantity = ""       # column by which orders are fitted
     column = ""         # that of its error
+    numbers = {}        # errors that are those of one number: its column
     slip = True         # default
 
     def __init__(self, full):
@@ -42,8 +44,7 @@ class ForceProblem(Problem):
             self.default |= {"pressure": self.pressures[0]}
         self.default |= SOLVER
         self.what = self.what.format(end=f"{self.end():g}", **self.default) + (
-            " Errors are against the mean of two runs with " + ", ".join(f"{k} {v}" for k, v in self.references()[0].items()
-                                                                       if k != "slip") + ", with and without slip.")
+            " Errors are against the run with " + ", ".join(f"{k} {v}" for k, v in self.references()[0].items()) + ".")
 
     def end(self):
         return self.end_us * (4 if self.full else 1)
@@ -55,7 +56,7 @@ class ForceProblem(Problem):
 
     def references(self):
         fine = self.finer if self.full else self.fine
-        return [fine | {"slip": True}, fine | {"slip": False}]
+        return [fine | {"slip": True}, fine | {"slip": False}, fine | {"slip": False, "spacing_um": self.default["spacing_um"]}]
 
     def case(self, settings):
         raise NotImplementedError
@@ -70,30 +71,28 @@ class ForceProblem(Problem):
     def finish(self, rows):
         done = [r for r in rows if r["code"] == 0]
         references = [r for r in done if r["varied"] == "reference"]
-        if len(references) < 2:
-            self.notes.append("Both references did not finish: there are no errors.")
+        if len(references) < 3:
+            self.notes.append("The references did not finish: there are no errors.")
             return
+        finest, uncorrected, coarse = references
         for row in done:
             if row["varied"] != "reference":
-                row |= {column: self.mean(column, row, references) for column in self.errors}
+                row |= {column: self.difference(column, row, finest) for column in self.errors}
+        ratio = coarse["spacing_um"] / finest["spacing_um"]
         for column in self.errors:
-            self.floors[column] = 0.5 * self.difference(column, *references)
+            self.floors[column] = 0.5 * self.difference(column, finest, uncorrected)
+        for column, number in self.numbers.items():
+            limit = uncorrected[number] + (uncorrected[number] - coarse[number]) / (ratio - 1)
+            self.floors[column] = percent(finest[number], limit)
         quantities = {self.quantity: self.errors[self.column]}
         note_orders(self, rows, "spacing_um", lambda h: 1 / h, quantities)
         self.floors[self.column] += note_orders(self, rows, "step_us", lambda dt: 1 / dt, quantities) or 0
         name = self.errors[self.column]
         compare_alone(self, done, lambda row, finest: {f"{name}_alone_pc": self.difference(self.column, row, finest)})
 
-    def mean(self, column, row, references):
-        return float(np.mean([self.difference(column, row, r) for r in references]))
-
     def difference(self, column, row, other):
-        raise NotImplementedError
-
-
-def to_mean(value, values):
-    """Per cent, from the mean of the references' values."""
-    return percent(value, np.mean(values))
+        """Per cent of the other's."""
+        return percent(row[self.numbers[column]], other[self.numbers[column]])
 
 
 class Capsule(ForceProblem):
@@ -102,6 +101,7 @@ class Capsule(ForceProblem):
             "in --quick): Taylor's deformation D of a neo-Hookean capsule over the run, largest difference over its value at the end.")
     errors = {"deformation_error_pc": "deformation"}
     quantity, column = "deformation", "deformation_error_pc"
+    numbers = {"deformation_error_pc": "deformation"}
     default = {"spacing_um": 0.75, "step_us": 100, "vertices": 500, "viscosity_ratio": 1}
     end_us = 5000
     fine = {"spacing_um": 0.45, "step_us": 25, "vertices": 1000}
@@ -127,10 +127,6 @@ class Capsule(ForceProblem):
     def quantities(self, settings, outcome):
         series = {round(r["time_us"]): r["deformation"] for r in outcome.history if round(r["time_us"]) % 1000 == 0}
         return {"deformation": outcome.history[-1]["deformation"], "_series": series}
-
-    def mean(self, column, row, references):
-        series = {t: np.mean([r["_series"][t] for r in references]) for t in row["_series"]}
-        return 100 * max(abs(row["_series"][t] - series[t]) for t in series) / series[max(series)]
 
     def difference(self, column, row, other):
         both = set(row["_series"]) & set(other["_series"])
@@ -158,6 +154,7 @@ class CellInShear(ForceProblem):
             f"surfaces after putting their centroids together, over {RADIUS_um} um. Deformation: of the ellipsoid of equal inertia.")
     errors = {"outline_error_pc": "outline", "deformation_error_pc": "deformation"}
     quantity, column = "deformation", "deformation_error_pc"
+    numbers = {"deformation_error_pc": "deformation"}
     default = {"spacing_um": 0.6, "step_us": 20, "vertices": 500, "viscosity_ratio": 5}
     end_us = 600
     fine = {"spacing_um": 0.4, "step_us": 10, "vertices": 1000}
@@ -180,13 +177,9 @@ class CellInShear(ForceProblem):
         return {"deformation": outcome.history[-1]["deformation"], "inclination_deg": outcome.history[-1]["inclination_deg"]}
 
     def difference(self, column, row, other):
-        if column == "deformation_error_pc":
-            return percent(row["deformation"], other["deformation"])
+        if column in self.numbers:
+            return super().difference(column, row, other)
         return 100 * compare_outlines.compare(row["_run"].folder, other["_run"].folder, [self.end()])[-1][1] / RADIUS_um
-
-    def mean(self, column, row, references):
-        return (to_mean(row["deformation"], [r["deformation"] for r in references]) if column == "deformation_error_pc"
-                else super().mean(column, row, references))
 
 
 class TwoCells(ForceProblem):
@@ -195,6 +188,7 @@ class TwoCells(ForceProblem):
             "smallest between them, over the reference's. Way: how far their centroids have come, over the reference's.")
     errors = {"gap_error_pc": "gap", "way_error_pc": "way"}
     quantity, column = "gap_um", "gap_error_pc"
+    numbers = {"gap_error_pc": "gap_um", "way_error_pc": "way_um"}
     default = {"spacing_um": 0.6, "step_us": 20, "vertices": 500, "contact_range_um": 0.25}
     end_us = 1000
     fine = {"spacing_um": 0.4, "step_us": 10, "vertices": 1000}
@@ -220,15 +214,6 @@ class TwoCells(ForceProblem):
         gap = min(compare_outlines.distances(a[0], *b).min() for a, b in (surfaces, surfaces[::-1]))
         return {"gap_um": gap, "way_um": come}
 
-    def of(self, column):
-        return column.replace("_error_pc", "_um")
-
-    def difference(self, column, row, other):
-        return percent(row[self.of(column)], other[self.of(column)])
-
-    def mean(self, column, row, references):
-        return to_mean(row[self.of(column)], [r[self.of(column)] for r in references])
-
 
 class Pack(TwoCells):
     name, title = "l_pack", "Pack of cells in shear"
@@ -237,6 +222,7 @@ class Pack(TwoCells):
             "reference's, over the rms way that they have come.")
     errors = {"work_error_pc": "work of the walls", "places_error_pc": "places of the cells"}
     quantity, column = "work_fJ", "work_error_pc"
+    numbers = {"work_error_pc": "work_fJ"}
     default = {"spacing_um": 0.6, "step_us": 20, "vertices": 500, "contact_range_um": 0.25, "viscosity_ratio": 5}
     end_us = 240
     slip = False        # as cases of dense blood leave it out
@@ -265,15 +251,11 @@ class Pack(TwoCells):
                 "gap_um": outcome.report["contact"]["smallest_gap_um"], "energy_balance_pc": 100 * outcome.report["errors"]["energy_balance"]}
 
     def difference(self, column, row, other):
-        if column == "work_error_pc":
-            return percent(row["work_fJ"], other["work_fJ"])
+        if column in self.numbers:
+            return super().difference(column, row, other)
         rms = lambda d: np.sqrt((d ** 2).sum(1).mean())
         way = [r["_ends"][1] - r["_ends"][0] for r in (row, other)]
         return 100 * rms(way[0] - way[1]) / rms(way[1])
-
-    def mean(self, column, row, references):
-        return (to_mean(row["work_fJ"], [r["work_fJ"] for r in references]) if column == "work_error_pc"
-                else ForceProblem.mean(self, column, row, references))
 
 
 PROBLEMS = [Capsule, ViscousCapsule, CellInShear, TwoCells, Pack]
