@@ -30,17 +30,23 @@ KOKKOS_INLINE_FUNCTION Dihedral dihedral(const Vec3& normal, const Vec3& other, 
 
 /// Two triangles that close like a book: (1 - cos) has no slope left when they lie on each other and then goes the other way, so
 /// that a sheet under compression folds through itself, and with it what is inside and outside. Beyond a right angle their
-/// moment has |tan(theta / 2)| - 1 on top, without bound up to the fold. Not of edges that are sharp at rest.
+/// moment has |tan(theta / 2)| - 1 on top, and from `steepest` on goes on as its tangent, which explicit steps can follow. Not
+/// of edges that are sharp at rest.
 struct Fold {
   double moment = 0, energy = 0;  // over k_b
 
   KOKKOS_INLINE_FUNCTION Fold(const Dihedral& angle, double cos_rest) {
-    constexpr double sharp = 0.5, least = 1e-9, right_angle = 1.5707963267948966;
+    constexpr double sharp = 0.5, right_angle = 1.5707963267948966;
     if (angle.cosine >= 0 || cos_rest < sharp) return;
-    const double open = 1 + angle.cosine > least ? 1 + angle.cosine : least;
-    const double over = std::fabs(angle.sine) / open - 1;
-    moment = angle.sine < 0 ? -over : over;
-    energy = right_angle - std::acos(open - 1) - std::log(open);
+    constexpr double steepest = 2.6179938779914944, cos_steepest = -0.8660254037844386, tan_half = 3.732050807568877;  // 150 degrees
+    constexpr double slope = 0.5 * (1 + tan_half * tan_half);
+    const double theta = std::acos(angle.cosine > -1 ? angle.cosine : -1.0);
+    const double beyond = theta > steepest ? theta - steepest : 0;
+    const double cosine = beyond > 0 ? cos_steepest : angle.cosine;
+    const double steep = std::sqrt((1 - cosine) / (1 + cosine)) - 1;  // up to where the tangent begins
+    const double size = steep + slope * beyond;
+    moment = angle.sine < 0 ? -size : size;
+    energy = right_angle - std::acos(cosine) - std::log(1 + cosine) + beyond * (steep + 0.5 * slope * beyond);
   }
 };
 
