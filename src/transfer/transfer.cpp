@@ -87,7 +87,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
 void Transfer::make_places(int vertices) {
   places_.vertices = vertices;
   if (!places_.known.data() || places_.known.extent(0) < static_cast<std::size_t>(vertices)) {
-    const int room = vertices + vertices / 16 + 1;
+    const int room = vertices + vertices / 32 + 1;
     places_.xi = Table<double>();
     places_.xi = make<Table<double>>("vertex_xi", room, 3);
     places_.known = make<Array<unsigned char>>("vertex_known", room);
@@ -103,7 +103,7 @@ void Transfer::take_up(const SurfaceSet& set) {
 
 void Transfer::make_room(int markers) {
   if (markers > room_) {
-    room_ = markers + markers / 16 + 1;
+    room_ = markers + markers / 32 + 1;
     markers_.vertex = make<Array<int>>("marker_vertex", room_);
     markers_.home = make<Array<unsigned char>>("marker_home", room_);
     markers_.eta = make<Table<double>>("marker_eta", room_, 3);
