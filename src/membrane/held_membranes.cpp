@@ -11,7 +11,7 @@ namespace corpuscle {
 namespace {
 
 /// Some to spare, so that arrays are seldom too small.
-std::size_t roomy(std::size_t count) { return count + count / 32 + 1; }
+std::size_t roomy(std::size_t count) { return count + count / 64 + 1; }
 
 template <class View>
 bool has_room(const View& view, std::size_t rows) {
