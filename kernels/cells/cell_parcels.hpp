@@ -1,4 +1,5 @@
-// Whole cells into and out of messages: the vertices of one cell after the other, the components of one vertex side by side.
+// Whole cells into and out of messages: the vertices of one cell after the other, the components of one vertex (up to three) side by
+// side.
 #pragma once
 
 #include "common/vec3.hpp"
@@ -19,12 +20,13 @@ inline void pack_cells(const ParcelViews& parcels, const Array<int>& first_verte
                        const Table<double>& message) {
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const ParcelViews p = parcels;
+  const int columns = static_cast<int>(field.extent(1));
   Kokkos::parallel_for(
       "corpuscle::cells::pack", Kokkos::TeamPolicy<Exec>(p.count, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
         const int n = team.league_rank(), to = p.first(n), from = first_vertex(p.cell(n));
         const Vec3 by = shifted ? Vec3{p.shift(n, 0), p.shift(n, 1), p.shift(n, 2)} : Vec3{};
         Kokkos::parallel_for(Kokkos::TeamThreadRange(team, p.first(n + 1) - to), [&](int i) {
-          for (int d = 0; d < 3; ++d) message(to + i, d) = shifted ? field(from + i, d) + by[d] : field(from + i, d);
+          for (int d = 0; d < columns; ++d) message(to + i, d) = shifted ? field(from + i, d) + by[d] : field(from + i, d);
         });
       });
 }
@@ -33,11 +35,12 @@ inline void unpack_cells(const ParcelViews& parcels, const Array<int>& first_ver
                          const Components<double>& field) {
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const ParcelViews p = parcels;
+  const int columns = static_cast<int>(field.extent(1));
   Kokkos::parallel_for(
       "corpuscle::cells::unpack", Kokkos::TeamPolicy<Exec>(p.count, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
         const int n = team.league_rank(), from = p.first(n), to = first_vertex(p.cell(n));
         Kokkos::parallel_for(Kokkos::TeamThreadRange(team, p.first(n + 1) - from), [&](int i) {
-          for (int d = 0; d < 3; ++d) field(to + i, d) = message(from + i, d);
+          for (int d = 0; d < columns; ++d) field(to + i, d) = message(from + i, d);
         });
       });
 }

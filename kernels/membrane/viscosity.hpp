@@ -334,11 +334,10 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
-/// The velocity under whatever pressure inside keeps the volume. A fluid that cannot be compressed answers to such a pressure with no
-/// velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
-template <class Damping, class Load>
-void predict_held_velocity(const MembraneViews& m, const ViscosityViews& w, const Load& outside, double dt) {
-  assemble_viscous<Damping>(m, w, outside, dt);
+/// The velocity under whatever pressure inside keeps the volume, after assemble_viscous(). A fluid that cannot be compressed answers to
+/// such a pressure with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
+template <class Damping>
+void solve_held(const MembraneViews& m, const ViscosityViews& w) {
   Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
                        HeldViscousSolve<Damping>({m, w}, viscous_tolerance, viscous_iterations));
 }

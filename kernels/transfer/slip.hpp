@@ -47,7 +47,7 @@ struct SlipViews {
   Components<double> normal;
   Array<double> area;  // [vertex] um2
   Array<double> gap;   // [vertex] um to the nearest other surface; without values nothing is near
-  Components<double> followed;  // [vertex, 3] nN, the part of the force that a step can follow; without values all of it
+  Components<double> followed;  // [vertex, 1] share of the force that a step can follow; without values all of it
 };
 
 /// How much of the slip is left at a gap of so many spacings: all above 1.5, none below 0.5. A velocity that belongs to one
@@ -85,15 +85,13 @@ KOKKOS_INLINE_FUNCTION Vec3 fade_at_sides(const TransferBlock& block, const doub
   return v;
 }
 
-/// followed [vertex, 3] = the share of the forces at which slip is no faster than `most` times that of the membrane at rest:
-/// what strain has stiffened further, explicit steps could not follow.
-inline void limit_slip(int vertices, const Components<double>& force, const Array<double>& stiffening, double most,
-                       const Components<double>& followed) {
+/// In place of how many times as stiff as at rest a vertex is, the share of the forces at which slip is no faster than `most` times that
+/// of the membrane at rest: what strain has stiffened further, explicit steps could not follow.
+inline void limit_slip(int vertices, double most, const Array<double>& stiffening) {
+  const Array<double> share = stiffening;
   Kokkos::parallel_for(
-      "corpuscle::transfer::limit_slip", Policy(0, vertices), KOKKOS_LAMBDA(int i) {
-        const double share = stiffening(i) > most ? most / stiffening(i) : 1;
-        store(followed, i, share * load(force, i));
-      });
+      "corpuscle::transfer::limit_slip", Policy(0, vertices),
+      KOKKOS_LAMBDA(int i) { share(i) = share(i) > most ? most / share(i) : 1; });
 }
 
 /// Of a marker's vertex, um/us.
@@ -106,7 +104,7 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const Slip
   for (int d = 0; d < 3; ++d) q.f[d] = q.f[d] < 0 ? 0 : (q.f[d] > 1 ? 1 : q.f[d]);
   Vec3 along[3];
   lattice.cell_tangents(q, along);
-  const Vec3 n = load(slip.normal, v), f = load(slip.followed.extent(0) > 0 ? slip.followed : slip.force, v);
+  const Vec3 n = load(slip.normal, v), f = (slip.followed.extent(0) > 0 ? slip.followed(v, 0) : 1.0) * load(slip.force, v);
   double share = 1 / (slip.viscosity * slip.area(v));
   if (slip.gap.extent(0) > 0) {
     double square = 0;  // of the spacing along the normal

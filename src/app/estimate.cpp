@@ -204,7 +204,7 @@ double of_shared_cells(const Case& scene, const SceneSize& size) {
   // Of a vertex and its two triangles: surface, places and markers; of an own one, motion and the room of the forces' parts.
   double vertex = 310, own = 260;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
-  if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * (9 + 22 - 21 + 2 * 3);  // MembraneViscosity, beyond the room of the forces' parts
+  if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * 2 * 3;  // MembraneViscosity
   if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }

@@ -26,7 +26,7 @@ class CopyMessages {
   /// @param received  copies that this rank holds
   void set(const Comm& comm, const std::vector<Copy>& sent, const std::vector<Copy>& received);
 
-  /// Values of a field [vertex, 3] from the cells to the copies. @param positions  they are shifted
+  /// Values of a field [vertex, up to 3] from the cells to the copies. @param positions  they are shifted
   void to_copies(const SurfaceSet& set, const Components<double>& field, bool positions);
   /// The cells' values become the sums over them and their copies, in the order of ranks and images.
   void add_copies(const SurfaceSet& set, const Components<double>& field);

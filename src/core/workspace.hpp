@@ -14,7 +14,7 @@ class Workspace {
   double* reserve(std::size_t numbers) {
     if (memory_.extent(0) < numbers) {
       memory_ = Array<double>();  // free before taking more
-      memory_ = Array<double>(uninitialised("corpuscle::core::workspace"), numbers + numbers / 16 + 1);
+      memory_ = Array<double>(uninitialised("corpuscle::core::workspace"), numbers + numbers / 32 + 1);
     }
     return memory_.data();
   }

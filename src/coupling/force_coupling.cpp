@@ -76,8 +76,7 @@ void ForceCoupling::take_up() {
   if (!scene_.coupling->slip) return;
   const std::size_t vertices = surfaces().vertices;
   if (followed_.extent(0) >= vertices) return Kokkos::deep_copy(followed_, 0.0);
-  stiffening_ = Array<double>("corpuscle::coupling::stiffening", vertices);
-  followed_ = Components<double>("corpuscle::coupling::followed", vertices, 3);
+  followed_ = Components<double>("corpuscle::coupling::followed", vertices, 1);
 }
 
 std::string ForceCoupling::vertex_text(int vertex) const {
@@ -353,8 +352,9 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
 /// Slip is stiff: all that grows with the stiffness is left to the grid's velocity once a step could no longer follow.
 void ForceCoupling::limit_slip(double dt) {
   const double most = (second_order(dt) ? second_order_share : 1.0) * stable_us_ / dt;
-  membranes_->measure_stiffening(stiffening_);
-  corpuscle::limit_slip(membranes_->vertices(), forces(), stiffening_, most, followed_);
+  const Array<double> share(followed_.data(), followed_.extent(0));
+  membranes_->measure_stiffening(share);
+  corpuscle::limit_slip(membranes_->vertices(), most, share);
   cells_->to_copies(followed_);
 }
 

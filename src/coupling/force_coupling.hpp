@@ -104,8 +104,7 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Transfer> transfer_;
   Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
-  Array<double> stiffening_;                    // [vertex]; only with slip
-  Components<double> followed_;                 // [vertex, 3] nN, of the forces what slip follows; only with slip
+  Components<double> followed_;                 // [vertex, 1] share of the forces that slip follows; only with slip
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely

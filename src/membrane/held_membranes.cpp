@@ -11,7 +11,7 @@ namespace corpuscle {
 namespace {
 
 /// Some to spare, so that arrays are seldom too small.
-std::size_t roomy(std::size_t count) { return count + count / 16 + 1; }
+std::size_t roomy(std::size_t count) { return count + count / 64 + 1; }
 
 template <class View>
 bool has_room(const View& view, std::size_t rows) {
@@ -58,6 +58,7 @@ Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Wo
   templates_ = make_surface_set(meshes);
   views_ = make_membrane_views(make_surface_set({}), types_, {});
   make_viscosity();
+  if (viscosity_) viscosity_->prepare(types_);
   status_host_ = HostCopy(views_.status);
   hold({}, 0);
 }

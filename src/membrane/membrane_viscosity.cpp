@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "membrane/elimination_order.hpp"
 #include "membrane/interface.hpp"
 
 namespace corpuscle {
@@ -13,12 +14,41 @@ namespace {
 
 auto label(const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); }
 
-std::size_t scratch_numbers(const MembraneViews& m) {
-  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles);
-  return entries + (entries + 1) / 2 + 22 * static_cast<std::size_t>(m.vertices);
+}  // namespace
+
+std::size_t MembraneViscosity::scratch_numbers(const MembraneViews& m) const {
+  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles), vectors = band_.teams > 0 ? 1 : 5;
+  return entries + (entries + 1) / 2 + (7 + 3 * vectors) * static_cast<std::size_t>(m.vertices);
 }
 
-}  // namespace
+/// A cell of n vertices takes about n^2 operations in a factorisation, and about as many in conjugate gradients, which take four times
+/// as long for 642 vertices; beyond some 2500 the band takes too much memory.
+void MembraneViscosity::prepare(const std::vector<CellReference>& types) {
+  constexpr double most_mb = 16, most_together_mb = 64;  // of the matrices at hand
+  constexpr int most_teams = 128;
+  std::vector<int> first, place;
+  std::size_t vertices = 0;
+  for (const CellReference& type : types) {
+    const EliminationOrder order = elimination_order(type.mesh);
+    first.push_back(static_cast<int>(place.size()));
+    place.insert(place.end(), order.place.begin(), order.place.end());
+    vertices = std::max(vertices, order.place.size());
+    band_.width = std::max(band_.width, order.width);
+  }
+  const std::size_t numbers = 3 * vertices * band_.stride();
+  const double mb = 8e-6 * static_cast<double>(numbers);
+  if (numbers == 0 || mb > most_mb) return;
+  band_.teams = std::min({Exec().concurrency(), most_teams, static_cast<int>(most_together_mb / mb)});
+  band_.first_place = Array<int>(label("viscous_first_place"), first.size());
+  band_.place = Array<int>(label("viscous_place"), place.size());
+  for (const auto& [view, values] : {std::pair{&band_.first_place, &first}, {&band_.place, &place}}) {
+    const auto host = Kokkos::create_mirror_view(*view);
+    std::copy(values->begin(), values->end(), host.data());
+    Kokkos::deep_copy(*view, host);
+  }
+  band_.column = Table<double>(label("viscous_band"), band_.teams, numbers);
+  band_.right_side = Table<double>(label("viscous_right_side"), band_.teams, 6 * vertices);
+}
 
 void MembraneViscosity::make_room(const MembraneViews& m) {
   scratch_ = Array<double>(label("viscous_scratch"), scratch_numbers(m));
@@ -38,7 +68,9 @@ void MembraneViscosity::divide_scratch(const MembraneViews& m, double* memory) {
   views_.neighbour = Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries);
   views_.diagonal = Array<double>(take(vertices), vertices);
   views_.block = Table<double>(take(6 * vertices), vertices, 6);
-  for (auto* vectors : {&views_.gradient, &views_.residual, &views_.search, &views_.image, &views_.inverse_gradient})
+  views_.gradient = Components<double>(take(3 * vertices), vertices, 3);
+  if (band_.teams > 0) return;
+  for (auto* vectors : {&views_.residual, &views_.search, &views_.image, &views_.inverse_gradient})
     *vectors = Components<double>(take(3 * vertices), vertices, 3);
 }
 
@@ -58,7 +90,11 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
 template <class Damping>
 void MembraneViscosity::resist_with(const MembraneViews& m, double beta, const Components<double>& force) const {
   constexpr double massless = 1e300;  // us: mass over it
-  predict_held_velocity<Damping>(m, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
+  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
+  if (band_.teams > 0)
+    solve_held<Damping>(m, views_, band_);
+  else
+    solve_held<Damping>(m, views_);
   subtract_damping<Damping>(m, views_, m.surface.v, force, views_.right_side);
   copy_vertices(m.vertices, force, given_);
 }

@@ -3,7 +3,8 @@
 
 #include "core/workspace.hpp"
 #include "membrane/elasticity.hpp"
-#include "membrane/viscosity.hpp"
+#include "membrane/reference.hpp"
+#include "membrane/viscous_band.hpp"
 
 namespace corpuscle {
 
@@ -13,6 +14,8 @@ class MembraneViscosity {
   /// Memory for these membranes; hold(): for those that a rank holds at present, which move with the fluid.
   void make_room(const MembraneViews& m);
   void hold(const MembraneViews& m);
+  /// Before hold(): matrices of these are factorised, unless they are too large for that.
+  void prepare(const std::vector<CellReference>& types);
   /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step; zero before the first.
   const Components<double>& given() const { return given_; }
 
@@ -41,6 +44,7 @@ class MembraneViscosity {
   int iterations() const;
 
  private:
+  std::size_t scratch_numbers(const MembraneViews& m) const;
   void divide_scratch(const MembraneViews& m, double* memory);
   template <class Damping>
   void resist_with(const MembraneViews& m, double beta, const Components<double>& force) const;
@@ -49,6 +53,7 @@ class MembraneViscosity {
   Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
   Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
+  ViscousBand band_;  // without teams: conjugate gradients
 };
 
 }  // namespace corpuscle

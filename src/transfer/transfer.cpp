@@ -87,7 +87,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
 void Transfer::make_places(int vertices) {
   places_.vertices = vertices;
   if (!places_.known.data() || places_.known.extent(0) < static_cast<std::size_t>(vertices)) {
-    const int room = vertices + vertices / 16 + 1;
+    const int room = vertices + vertices / 64 + 1;
     places_.xi = Table<double>();
     places_.xi = make<Table<double>>("vertex_xi", room, 3);
     places_.known = make<Array<unsigned char>>("vertex_known", room);
@@ -103,7 +103,7 @@ void Transfer::take_up(const SurfaceSet& set) {
 
 void Transfer::make_room(int markers) {
   if (markers > room_) {
-    room_ = markers + markers / 16 + 1;
+    room_ = markers + markers / 64 + 1;
     markers_.vertex = make<Array<int>>("marker_vertex", room_);
     markers_.home = make<Array<unsigned char>>("marker_home", room_);
     markers_.eta = make<Table<double>>("marker_eta", room_, 3);
@@ -118,7 +118,7 @@ void Transfer::weigh() {
   weighed_ = true;
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
-  const auto rows = static_cast<std::size_t>(room_);
+  const auto rows = static_cast<std::size_t>(markers_.count);
   double* memory = workspace_->reserve((6 * points + 3) * rows);
   markers_.weight = Table<double>(memory, rows, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);

@@ -36,7 +36,7 @@ class Transfer {
                    const Components<double>& velocity);
   /// What the slip of a membrane depends on, with this kernel's law.
   /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
-  /// @param followed  [vertex, 3] nN, of the force what the slip follows; without values all of it
+  /// @param followed  [vertex, 1] share of the force that the slip follows; without values all of it
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<double>& gap = {},
                  const Components<double>& followed = {}) const;
 
