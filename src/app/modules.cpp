@@ -51,6 +51,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   const bool force = fluid && cells && scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   add("immersed search", fluid && ((cells && !force) || bodies));
   add("transfer of forces", force);
+  add("sharp pressure", force && scene.coupling->pressure == CouplingSettings::Pressure::sharp);
   add("viscosity ratio", std::any_of(scene.cells.begin(), scene.cells.end(),
                                      [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
   add("contact", force && scene.contact);

@@ -49,10 +49,14 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
   // From where the film drains, and from where contact acts at once; steps of half the largest stable one and more.
   struct Setting {
     double gap, push, step, end, balance;
+    CouplingSettings::Pressure pressure = CouplingSettings::Pressure::spread;
   };
-  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.01});
+  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.01},
+                             Setting{0.15, 0.5, 20, 2000, 0.02, CouplingSettings::Pressure::sharp});
   Timers timers;
-  FlowSimulation simulation(Comm(), pressed_cells(s.gap, s.push, s.step, s.end), timers);
+  Case scene = pressed_cells(s.gap, s.push, s.step, s.end);
+  scene.coupling->pressure = s.pressure;
+  FlowSimulation simulation(Comm(), scene, timers);
   EnergyBalance energy(simulation);
   const auto elastic = [&] {
     double sum = 0;

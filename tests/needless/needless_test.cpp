@@ -30,6 +30,7 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
     {"membrane viscosity",
      {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve", "corpuscle::membrane::viscous_sums"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
+    {"sharp pressure", {"corpuscle::transfer::jump"}},
     {"viscosity ratio", {"corpuscle::transfer::inside", "corpuscle::fluid::excess_dissipation"}},
     {"contact", {"corpuscle::contact::"}},
     {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
@@ -207,6 +208,9 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   }
   SECTION("straight tube, membranes as forces, and cytosol") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cells.0.viscosity_ratio=5"});
+  }
+  SECTION("straight tube, membranes as forces, and a pressure that jumps") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "coupling.pressure=sharp"});
   }
   SECTION("straight tube, membranes as forces that touch") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "contact.range_um=0.25"}, 3);
