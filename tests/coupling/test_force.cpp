@@ -207,7 +207,7 @@ TEST_CASE("a capsule deforms the same where its pressure jumps", "[coupling][for
 TEST_CASE("triangles that reach too far for a pressure that jumps are refused", "[coupling][force][sharp]") {
   Case scene = sheared_cell(10, 100, false);
   scene.coupling->pressure = Pressure::sharp;
-  scene.grid->nodes[0] = 61;  // spacings of a seventh of an edge along x
+  scene.grid->nodes[0] = 121;  // an edge is fourteen spacings along x
   scene.cells[0].vertices = 200;
   scene.cells[0].center_um = {5, 0, 0};  // astride the side of the block
   const std::string text = refusal(scene);
