@@ -13,32 +13,61 @@
 
 namespace corpuscle {
 
-/// Forces [vertex, 3], nN, as jump S + rest, S the area vector of a vertex: a third of those of the triangles around it, as in the
-/// change of the volume by its motion. Jumps that are linear on triangles then add up to the forces jump S.
-/// @param jump_of  [vertex] kPa, of the pressure from inside to outside
-/// @param rest_of  [vertex, 3] nN, what is left to spread
-inline void split_loads(const SurfaceSet& set, const Components<double>& force, const Array<double>& jump_of,
-                        const Components<double>& rest_of) {
-  const auto x = set.x;
-  const auto triangle = set.triangle;
-  const auto ring_start = set.ring_start, ring_triangle = set.ring_triangle;
-  const auto jump = jump_of;
-  const auto rest = rest_of;
+/// A third of the area vectors around a vertex, um2, and of their lengths: its part in the change of the volume by its motion.
+struct VertexArea {
+  Vec3 vector;
+  double whole = 0;
+};
+KOKKOS_INLINE_FUNCTION VertexArea vertex_area(const SurfaceSet& set, int v) {
+  VertexArea area;
+  for (int r = set.ring_start(v); r < set.ring_start(v + 1); ++r) {
+    const Vec3 a = area_vector(set.triangle, set.x, set.ring_triangle(r));
+    area.vector += a;
+    area.whole += norm(a);
+  }
+  area.vector *= 1.0 / 3;
+  area.whole /= 3;
+  return area;
+}
+
+/// jump [vertex], kPa, of the pressure from inside to outside = the part of the forces [vertex, 3], nN, along the normal, over the area.
+inline void normal_loads(const SurfaceSet& surface, const Components<double>& force, const Array<double>& jump) {
+  const SurfaceSet set = surface;
+  const auto f = force;
+  const auto out = jump;
   Kokkos::parallel_for(
-      "corpuscle::transfer::jump_split", Policy(0, set.vertices), KOKKOS_LAMBDA(int v) {
-        constexpr double folded = 0.25;  // square of the area vector over that of the area: beyond, a normal says little
-        Vec3 sum;
-        double whole = 0;
-        for (int r = ring_start(v); r < ring_start(v + 1); ++r) {
-          const Vec3 area = area_vector(triangle, x, ring_triangle(r));
-          sum += area;
-          whole += norm(area);
-        }
-        const Vec3 s = (1.0 / 3) * sum, f = load(force, v);
-        const double square = dot(s, s), least = folded * whole * whole / 9;
-        jump(v) = least > 0 ? dot(f, s) / (square > least ? square : least) : 0;
-        store(rest, v, f - jump(v) * s);
+      "corpuscle::transfer::jump_load", Policy(0, set.vertices), KOKKOS_LAMBDA(int v) {
+        constexpr double folded = 0.25;  // square of the area vector over that of the area: below, a normal says little
+        const VertexArea area = vertex_area(set, v);
+        const double square = dot(area.vector, area.vector), least = folded * area.whole * area.whole;
+        out(v) = least > 0 ? dot(load(f, v), area.vector) / (square > least ? square : least) : 0;
       });
+}
+
+/// smooth [vertex] = the mean over the triangles around each vertex. A grid line a spacing from the next sees of a load that changes
+/// from vertex to vertex too much or too little; what is taken off is spread.
+inline void smooth_loads(const SurfaceSet& surface, const Array<double>& jump, const Array<double>& smooth) {
+  const SurfaceSet set = surface;
+  const auto in = jump, out = smooth;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::jump_smooth", Policy(0, set.vertices), KOKKOS_LAMBDA(int v) {
+        double sum = 0;
+        for (int r = set.ring_start(v); r < set.ring_start(v + 1); ++r)
+          for (int k = 0; k < 3; ++k) sum += in(set.triangle(set.ring_triangle(r), k));
+        const int triangles = set.ring_start(v + 1) - set.ring_start(v);
+        out(v) = triangles > 0 ? sum / (3 * triangles) : 0;
+      });
+}
+
+/// rest [vertex, 3] nN = what the jumps leave of the forces: jumps that are linear on triangles add up to jump x area vector.
+inline void rest_of_loads(const SurfaceSet& surface, const Components<double>& force, const Array<double>& jump,
+                          const Components<double>& rest) {
+  const SurfaceSet set = surface;
+  const auto f = force, out = rest;
+  const auto of = jump;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::jump_rest", Policy(0, set.vertices),
+      KOKKOS_LAMBDA(int v) { store(out, v, load(f, v) - of(v) * vertex_area(set, v).vector); });
 }
 
 /// Largest magnitude of the jumps; not a number if any is not.

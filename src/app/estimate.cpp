@@ -205,7 +205,7 @@ double of_shared_cells(const Case& scene, const SceneSize& size) {
   double vertex = 310, own = 260;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
   if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * (2 * 9 + 22 + 2 * 3);  // MembraneViscosity
-  if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 32;
+  if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 40;
   if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }

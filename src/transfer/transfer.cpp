@@ -161,12 +161,16 @@ void Transfer::spread(const Components<double>& force) { spread_rest(force, null
 
 void Transfer::spread(const Components<double>& force, const SurfaceSet& surface) {
   const std::size_t vertices = surface.vertices;
-  if (jump_->jump.extent(0) < vertices) {
+  if (jump_->rest.extent(0) < vertices) {
     const std::size_t room = vertices + vertices / 16 + 1;
-    jump_->jump = make<Array<double>>("jump", room);
+    jump_->jump = make<Array<double>>("jump", 2 * room);
     jump_->rest = make<Components<double>>("jump_rest", room, 3);
   }
-  split_loads(surface, force, jump_->jump, jump_->rest);
+  const Array<double> once = Kokkos::subview(jump_->jump, std::make_pair(jump_->rest.extent(0), jump_->jump.extent(0)));
+  normal_loads(surface, force, jump_->jump);
+  smooth_loads(surface, jump_->jump, once);
+  smooth_loads(surface, once, jump_->jump);
+  rest_of_loads(surface, force, jump_->jump, jump_->rest);
   spread_rest(jump_->rest, &surface);
 }
 

@@ -83,7 +83,7 @@ class Transfer {
   Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then
   /// Of a pressure that jumps.
   struct Jump {
-    Array<double> jump;       // [vertex] kPa
+    Array<double> jump;       // [vertex] kPa, and as much room again
     Components<double> rest;  // [vertex, 3] nN
     Array<std::int64_t> sum;  // [cell]
   };
