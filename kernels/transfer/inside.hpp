@@ -1,16 +1,10 @@
 // How much of each grid cell is inside membranes: signed crossings of the grid's index lines with triangles, counted in
-// integers, so that neither the order of the sums nor rounding in the geometry matters. In index space triangles are
-// flat and vertices are rounded to a fine lattice: whether a line meets a triangle is then decided exactly, and a
-// closed surface never leaks.
+// integers, so that neither the order of the sums nor rounding in the geometry matters.
 #pragma once
 
-#include "transfer/find_markers.hpp"
+#include "transfer/crossings.hpp"
 
 namespace corpuscle {
-
-/// A spacing is this many units: errors of 1e-6 spacings.
-constexpr int inside_bits = 20;
-constexpr std::int64_t inside_unit = std::int64_t(1) << inside_bits;
 
 /// For each direction, over the cells of the block in units: first what the crossings of the line through a cell change
 /// there, then what they add up to, the part of the cell that is inside. The last halo cell below a line holds where it
@@ -28,93 +22,22 @@ struct InsideSurface {
   Table<int> turns;          // [body, 3] periods by which it has been shifted to where this block sees it
 };
 
-/// Where a vertex is in index space, in units. @returns false if it was not found
-KOKKOS_INLINE_FUNCTION bool place_in_units(const MarkerSearch& s, const VertexPlaces& places, int v, std::int64_t (&at)[3]) {
-  if (!places.known(v)) return false;
-  const double xi[3] = {places.xi(v, 0), places.xi(v, 1), places.xi(v, 2)};
-  LatticePoint q;
-  s.lattice.set(q, xi);
-  double eta[3];
-  lattice_to_index(s.lattice, q, eta);
-  for (int d = 0; d < 3; ++d) at[d] = static_cast<std::int64_t>(std::floor(eta[d] * inside_unit + 0.5));
-  return true;
-}
-
-/// Which side of the line from a to b the origin is on, in a plane: +1 left, -1 right. A tie goes as for an origin
-/// moved by a little along the first axis and by much less along the second, so that both triangles of an edge agree; 0
-/// only if a = b.
-KOKKOS_INLINE_FUNCTION int side_of_edge(const std::int64_t (&a)[2], const std::int64_t (&b)[2]) {
-  const std::int64_t area = a[0] * b[1] - a[1] * b[0], up = a[1] - b[1], along = b[0] - a[0];
-  const std::int64_t decides = area != 0 ? area : (up != 0 ? up : along);
-  return decides > 0 ? 1 : (decides < 0 ? -1 : 0);
-}
-
-/// Where the line along d that passes through zero of the other two coordinates meets a triangle, in units along d.
-/// @returns +1 if the line enters the surface there, -1 if it leaves, 0 if they do not meet
-KOKKOS_INLINE_FUNCTION int cross_triangle(const std::int64_t (&corner)[3][2], const std::int64_t (&along)[3],
-                                          std::int64_t& at) {
-  int turn = 0;
-  std::int64_t weight[3], total = 0;
-  for (int k = 0; k < 3; ++k) {
-    const int b = k == 2 ? 0 : k + 1, c = k == 0 ? 2 : k - 1;
-    const int side = side_of_edge(corner[b], corner[c]);
-    if (side == 0 || (k > 0 && side != turn)) return 0;
-    turn = side;
-    weight[k] = corner[b][0] * corner[c][1] - corner[b][1] * corner[c][0];
-    total += weight[k];
-  }
-  const double share1 = static_cast<double>(weight[1]) / static_cast<double>(total),
-               share2 = static_cast<double>(weight[2]) / static_cast<double>(total);
-  const double beyond_first =
-      share1 * static_cast<double>(along[1] - along[0]) + share2 * static_cast<double>(along[2] - along[0]);
-  at = along[0] + static_cast<std::int64_t>(std::floor(beyond_first + 0.5));
-  return -turn;  // its normal, which points outward, has the sign of `turn` along d
-}
-
-KOKKOS_INLINE_FUNCTION std::int64_t floor_units(std::int64_t a) { return a >> inside_bits; }
-
 /// What a triangle changes on the lines along d of this block.
 KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int64_t (&corner)[3][3], int d, int turns,
                                           const Array<int>& part) {
   const IndexSpace& index = lattice.index;
   constexpr std::int64_t half = inside_unit / 2;
-  const int e = (d + 1) % 3, f = (d + 2) % 3, plane[2] = {e, f};
-  int first[2], last[2];
-  for (int m = 0; m < 2; ++m) {
-    std::int64_t low = corner[0][plane[m]], high = low;
-    for (int k = 1; k < 3; ++k) {
-      const std::int64_t value = corner[k][plane[m]];
-      low = value < low ? value : low;
-      high = value > high ? value : high;
-    }
-    const std::int64_t most = index.n[plane[m]] - 1;
-    first[m] = static_cast<int>(low > 0 ? floor_units(low) : 0);
-    last[m] = static_cast<int>(floor_units(high) < most ? floor_units(high) : most);
-  }
-  const std::int64_t along[3] = {corner[0][d], corner[1][d], corner[2][d]};
-  for (int b = first[1]; b <= last[1]; ++b)
-    for (int a = first[0]; a <= last[0]; ++a) {
-      std::int64_t relative[3][2];
-      for (int k = 0; k < 3; ++k) {
-        relative[k][0] = corner[k][e] - a * inside_unit;
-        relative[k][1] = corner[k][f] - b * inside_unit;
-      }
-      std::int64_t at = 0;
-      const int sign = cross_triangle(relative, along, at);
-      if (sign == 0) continue;
-      std::int64_t from_side = at + half;  // of the block
-      if (lattice.boundary_above[d] && from_side >= index.n[d] * inside_unit) from_side = index.n[d] * inside_unit - 1;
-      const std::int64_t cell = floor_units(from_side);
-      if (cell < 0 || cell >= index.n[d]) continue;
-      const int within = static_cast<int>(from_side - cell * inside_unit);  // of the cell, before the crossing
-      int where[3];
-      where[d] = static_cast<int>(cell), where[e] = a, where[f] = b;
-      const int c = index.cell(where[0], where[1], where[2]), s = index.stride(d);
-      Kokkos::atomic_add(&part(c), sign * (static_cast<int>(inside_unit) - within));
-      Kokkos::atomic_add(&part(c + s), sign * within);
-      if (turns != 0)
-        Kokkos::atomic_add(&part(c - (static_cast<int>(cell) + 1) * s), sign * turns * static_cast<int>(inside_unit));
-    }
+  visit_crossings(index, corner, d, [&](const Crossing& crossing, const int (&line)[3]) {
+    std::int64_t from_side = crossing.at + half;  // of the block
+    if (lattice.boundary_above[d] && from_side >= index.n[d] * inside_unit) from_side = index.n[d] * inside_unit - 1;
+    const std::int64_t cell = floor_units(from_side);
+    if (cell < 0 || cell >= index.n[d]) return;
+    const int within = static_cast<int>(from_side - cell * inside_unit);  // of the cell, before the crossing
+    const int start = index.cell(line[0], line[1], line[2]), s = index.stride(d), c = start + static_cast<int>(cell) * s;
+    Kokkos::atomic_add(&part(c), crossing.sign * (static_cast<int>(inside_unit) - within));
+    Kokkos::atomic_add(&part(c + s), crossing.sign * within);
+    if (turns != 0) Kokkos::atomic_add(&part(start - s), crossing.sign * turns * static_cast<int>(inside_unit));
+  });
 }
 
 /// Fills `inside` with the changes along each line. A line that comes in through a periodic side is inside as often as,
@@ -134,13 +57,7 @@ inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vert
         std::int64_t corner[3][3];
         for (int k = 0; k < 3; ++k)
           if (!place_in_units(s, places, of.triangle(t, k), corner[k])) return;
-        const IndexSpace& index = s.lattice.index;
-        for (int d = 0; d < 3; ++d) {
-          std::int64_t low = corner[0][d], high = low;
-          for (int k = 1; k < 3; ++k)
-            low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
-          if (high < -inside_unit || low > index.n[d] * inside_unit) return;
-        }
+        if (beyond_block(s.lattice.index, corner)) return;
         for (int d = 0; d < 3; ++d) add_crossings(s.lattice, corner, d, of.turns(body, d), out.part[d]);
       });
 }

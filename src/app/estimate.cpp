@@ -205,6 +205,7 @@ double of_shared_cells(const Case& scene, const SceneSize& size) {
   double vertex = 310, own = 260;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
   if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * 2 * 3;  // MembraneViscosity
+  if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 40;
   if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }
@@ -243,7 +244,8 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   // Transfer: of a kernel that is sharpened twice the faces once more, and other areas on grids that are not uniform.
   const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
   const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
-  const double search = size.shared ? 29 + sharpening : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
+  const bool jumps = size.shared && scene.coupling->pressure == CouplingSettings::Pressure::sharp;
+  const double search = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
   const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 3 * 24 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle

@@ -68,6 +68,7 @@ ModuleList list_modules(const Case& scene, int ranks) {
   add("immersed search", fluid && ((cells && !force) || bodies));
   add("transfer of forces", force);
   add("slip correction", force && scene.coupling->slip);
+  add("sharp pressure", force && scene.coupling->pressure == CouplingSettings::Pressure::sharp);
   add("viscosity ratio", any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; }));
   add("contact", force && scene.contact);
   add("rigid bodies", bodies);

@@ -57,6 +57,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   take_places(scene, packed, contact_reach(scene));
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
+  if (sharp_pressure()) transfer_->sharpen_pressure();
   if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
   fluid.set_face_force(transfer_->faces());
   std::vector<double> ratios;
@@ -129,6 +130,18 @@ void ForceCoupling::fill_cells(double time) {
                     time));
 }
 
+/// @throws ComputationError  if some of the jumps of pressure would be missed
+void ForceCoupling::check_jumps(double time) {
+  if (!sharp_pressure()) return;
+  together([&] {
+    if (transfer_->reach_too_far(surfaces()))
+      throw ComputationError(fmt::format(
+          "where the pressure jumps cannot be told at {:.6g} us: a triangle of a membrane reaches over more than two spacings of the "
+          "grid. Use more vertices (cells.vertices), a coarser grid (grid.nodes), or coupling.pressure = \"spread\"",
+          time));
+  });
+}
+
 void ForceCoupling::check_start() {
   const Comm& comm = fluid_.grid().comm();
   if (grows_) inflate();
@@ -149,6 +162,7 @@ void ForceCoupling::check_start() {
   try {
     place(0);
     fill_cells(0);
+    check_jumps(0);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
@@ -319,6 +333,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     const auto scope = timers_.scope("transfer");
     place(time);
     fill_cells(time);
+    check_jumps(time);
     if (loads_) {
       const auto contact = timers_.scope("contact");
       loads_->gather(dt, second_order(dt));
@@ -329,7 +344,10 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     }
     cells_->to_copies(forces());
     if (scene_.coupling->slip) limit_slip(dt);
-    transfer_->spread(forces());
+    if (sharp_pressure())
+      transfer_->spread(forces(), surfaces());
+    else
+      transfer_->spread(forces());
   }
   fluid_.solve(time + dt, nullptr);
   {

@@ -59,6 +59,8 @@ class ForceCoupling : public Coupling {
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);
   void fill_cells(double time_us);
+  bool sharp_pressure() const { return scene_.coupling->pressure == CouplingSettings::Pressure::sharp; }
+  void check_jumps(double time_us);
   void take_up();
   void watch_outflow();
   /// What fails on one rank fails on all.

@@ -49,10 +49,12 @@ void read_transfer(Section& s, CouplingSettings& c) {
   if (c.scheme == CouplingSettings::Scheme::force) {
     c.kernel = s.choice<Kernel>("kernel", {{"three-point", Kernel::three_point}, {"four-point", Kernel::four_point}}, c.kernel);
     c.slip = s.flag("slip", c.slip);
+    using Pressure = CouplingSettings::Pressure;
+    c.pressure = s.choice<Pressure>("pressure", {{"spread", Pressure::spread}, {"sharp", Pressure::sharp}}, c.pressure);
     s.unused(robin, "scheme = \"force\" has no such key: membranes move with the fluid");
     return;
   }
-  for (const char* key : {"kernel", "slip"})
+  for (const char* key : {"kernel", "slip", "pressure"})
     s.unused(key, "only scheme = \"force\" has this key: with the others membranes cut the grid");
   s.describe(robin, "a number, 0 or more", "pi times viscosity over grid spacing, or more where stability needs it");
   if (s.node(robin)) c.robin_coefficient = s.number(robin, not_negative(1e12));

@@ -173,6 +173,7 @@ struct CouplingSettings {
   enum class Scheme { robin, iterated, loose, force };
   enum class Acceleration { anderson, aitken };
   enum class Kernel { three_point, four_point };
+  enum class Pressure { spread, sharp };
 
   Scheme scheme = Scheme::robin;
   double tolerance = 1e-3;              // iterated: residual over the step's displacement
@@ -182,6 +183,7 @@ struct CouplingSettings {
   bool robin_in_iterated = true;
   Kernel kernel = Kernel::three_point;  // force
   bool slip = true;                     // force
+  Pressure pressure = Pressure::spread; // force: whether what is normal to membranes is spread, or jumps
 
   bool operator==(const CouplingSettings&) const = default;
 };

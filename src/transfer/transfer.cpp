@@ -1,9 +1,11 @@
 #include "transfer/transfer.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "transfer/delta.hpp"
 #include "transfer/marker_bins.hpp"
+#include "transfer/pressure_jump.hpp"
 #include "transfer/sharpen.hpp"
 #include "transfer/transfer_kernels.hpp"
 
@@ -162,7 +164,25 @@ void Transfer::prepare_sharpening() {
   for (int d = 0; d < 3; ++d) block_.sharp_area[d] = sharp[d];
 }
 
-void Transfer::spread(const Components<double>& force) {
+void Transfer::spread(const Components<double>& force) { spread_rest(force, nullptr); }
+
+void Transfer::spread(const Components<double>& force, const SurfaceSet& surface) {
+  const std::size_t vertices = surface.vertices;
+  if (jump_->rest.extent(0) < vertices) {
+    const std::size_t room = vertices + vertices / 16 + 1;
+    jump_->jump = make<Array<double>>("jump", 2 * room);
+    jump_->rest = make<Components<double>>("jump_rest", room, 3);
+  }
+  const Array<double> once = Kokkos::subview(jump_->jump, std::make_pair(jump_->rest.extent(0), jump_->jump.extent(0)));
+  normal_loads(surface, force, jump_->jump);
+  smooth_loads(surface, jump_->jump, once);
+  smooth_loads(surface, once, jump_->jump);
+  rest_of_loads(surface, force, jump_->jump, jump_->rest);
+  spread_rest(jump_->rest, &surface);
+}
+
+/// @param surface  null where there is no more to them
+void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* surface) {
   weigh();
   const bool sharp = moment_ > 0;
   const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
@@ -170,11 +190,30 @@ void Transfer::spread(const Components<double>& force) {
     resolve_forces<decltype(delta)>(block_, markers_, force);
     spread_forces<decltype(delta)>(block_, markers_, spread);
   });
-  for (int d = 0; d < 3; ++d) {
-    grid_->halo().exchange(spread.across[d]);
-    if (!sharp) continue;
+  for (int d = 0; d < 3 && sharp; ++d) {
+    grid_->halo().exchange(raw_[d]);
     sharpen_faces(block_, Sharpen::forces, d, moment_, {}, raw_[d], faces_.across[d]);
-    grid_->halo().exchange(faces_.across[d]);
+  }
+  if (surface) add_pressure_jumps(*surface);
+  for (int d = 0; d < 3; ++d) grid_->halo().exchange(faces_.across[d]);
+}
+
+void Transfer::sharpen_pressure() {
+  jump_.emplace();
+  jump_->sum = Array<std::int64_t>("corpuscle::transfer::jump_sum", block_.index().size());
+}
+
+bool Transfer::reach_too_far(const SurfaceSet& surface) const { return jumps_beyond_knowledge(search_, places_, surface); }
+
+void Transfer::add_pressure_jumps(const SurfaceSet& surface) {
+  constexpr double least = 1e-200;  // kPa
+  constexpr int bits = 51;          // of a jump: a thousand of them on one face are still an integer of 62
+  const double most = largest_jump(surface.vertices, jump_->jump);
+  if (!std::isfinite(most) || most < least) return;  // what is not a number is so in what is spread, too
+  const double scale = std::ldexp(1.0, bits - std::ilogb(most) - 1);
+  for (int d = 0; d < 3; ++d) {
+    sum_jumps(search_, places_, surface, d, jump_->jump, scale, jump_->sum);
+    add_jumps(block_.index(), d, jump_->sum, scale, faces_.across[d]);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "core/workspace.hpp"
 #include "fluid/masked_gradient.hpp"
@@ -27,6 +28,12 @@ class Transfer {
   int place(const Components<double>& x);
   /// The forces [vertex, 3], nN, onto faces().
   void spread(const Components<double>& force);
+  /// The same with what is normal to the surface that they act on as a jump of the pressure across it. After sharpen_pressure().
+  void spread(const Components<double>& force, const SurfaceSet& surface);
+  /// From now on there is memory for that.
+  void sharpen_pressure();
+  /// Whether triangles reach farther than this rank's block knows of vertices: then some jumps would be missing. After place().
+  bool reach_too_far(const SurfaceSet& surface) const;
   /// The force on faces, with valid halos: shared with the fluid.
   const FaceForce& faces() const { return faces_; }
   /// Velocity of the vertices [vertex, 3], um/us, from fluxes through faces and velocities on the sides of the block: this
@@ -54,6 +61,8 @@ class Transfer {
 
  private:
   void prepare_sharpening();
+  void add_pressure_jumps(const SurfaceSet& surface);
+  void spread_rest(const Components<double>& force, const SurfaceSet* surface);
   void make_places(int vertices);
   void make_room(int markers);
   void weigh();
@@ -74,6 +83,13 @@ class Transfer {
   FaceForce faces_;
   double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing
   Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then
+  /// Of a pressure that jumps.
+  struct Jump {
+    Array<double> jump;       // [vertex] kPa, and as much room again
+    Components<double> rest;  // [vertex, 3] nN
+    Array<std::int64_t> sum;  // [cell]
+  };
+  std::optional<Jump> jump_;
 };
 
 }  // namespace corpuscle

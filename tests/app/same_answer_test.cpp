@@ -141,6 +141,9 @@ TEST_CASE("a restart goes on with the same bits") {
     require_same_after_restart(folder, scene("straight_tube"),
                                {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"}, true, false);
   }
+  SECTION("cell as a force, with a pressure that jumps") {
+    require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=force", "coupling.pressure=sharp"}, true, false);
+  }
   SECTION("cell as a force, with cytosol and membrane viscosity") {
     require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=force", "cells.0.viscosity_ratio=5"}, true, false);
   }

@@ -49,10 +49,14 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
   // From where the film drains, and from where contact acts at once; steps of half the largest stable one and more.
   struct Setting {
     double gap, push, step, end, balance;
+    CouplingSettings::Pressure pressure = CouplingSettings::Pressure::spread;
   };
-  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.01});
+  const Setting s = GENERATE(Setting{0.5, 0.2, 20, 1500, 0.02}, Setting{0.15, 0.5, 20, 2000, 0.01},
+                             Setting{0.15, 0.5, 20, 2000, 0.03, CouplingSettings::Pressure::sharp});
   Timers timers;
-  FlowSimulation simulation(Comm(), pressed_cells(s.gap, s.push, s.step, s.end), timers);
+  Case scene = pressed_cells(s.gap, s.push, s.step, s.end);
+  scene.coupling->pressure = s.pressure;
+  FlowSimulation simulation(Comm(), scene, timers);
   EnergyBalance energy(simulation);
   const auto elastic = [&] {
     double sum = 0;
@@ -76,7 +80,8 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
     CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-4));
     CHECK(cell.area_um2 == Approx(cell.rest_area_um2).epsilon(0.03));
   }
-  // Most of it of the first steps: the load is sudden, and the work of a step is that of its ends.
+  // Most of it of the first steps: the load is sudden, and the work of a step is that of its ends. Where the pressure jumps, it is 0.022:
+  // both membranes cut the same lines beside a film of a third of a spacing, and vertices move with a mean over three.
   CHECK(*energy.imbalance() < s.balance);
 }
 

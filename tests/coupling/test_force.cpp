@@ -15,6 +15,7 @@ using namespace corpuscle::scenes;
 namespace {
 
 using Type = BoundarySettings::Type;
+using Pressure = CouplingSettings::Pressure;
 
 /// A red cell between walls that move along x, periodic along x and z: 500 /s in 10 um, spacing 0.5 um.
 Case sheared_cell(double step_us, double end_us, bool slip) {
@@ -84,11 +85,14 @@ TEST_CASE("a sheared cell keeps its volume, and the energy balances", "[coupling
   struct Setting {
     bool slip;
     double ratio, viscosity;  // of the inside over the outside; of the membrane, N s/m
+    Pressure pressure = Pressure::spread;
   };
-  const auto s = GENERATE(Setting{false, 1, 0}, Setting{true, 1, 0}, Setting{false, 5, 0}, Setting{true, 0.2, 0}, Setting{true, 5, 1e-7});
+  const auto s = GENERATE(Setting{false, 1, 0}, Setting{true, 1, 0}, Setting{false, 5, 0}, Setting{true, 0.2, 0}, Setting{true, 5, 1e-7},
+                          Setting{true, 5, 1e-7, Pressure::sharp});
   Case scene = sheared_cell(10, 1000, s.slip);
   scene.cells[0].viscosity_ratio = s.ratio;
   scene.cells[0].membrane_viscosity_N_s_per_m = s.viscosity;
+  scene.coupling->pressure = s.pressure;
   const Run r = run(scene);
   if (std::getenv("CORPUSCLE_SHOW"))
     WARN(fmt::format("volume {:.2e}, area {:.2e}, balance {:.2e}, of the coupling {:.2e}",
@@ -118,6 +122,7 @@ TEST_CASE("where a membrane is in a periodic domain changes nothing but its plac
   // Moved by whole cells: astride the sides of the block, and over its edge. Round-off, grown over the run.
   Case scene = sheared_cell(10, 200, false);
   scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
+  scene.coupling->pressure = GENERATE(Pressure::spread, Pressure::sharp);
   const Run middle = run(scene);
   for (const Triple& shift : {Triple{5, 0, 0}, Triple{4.5, 0, -5}}) {
     scene.cells[0].center_um = shift;
@@ -127,8 +132,10 @@ TEST_CASE("where a membrane is in a periodic domain changes nothing but its plac
 }
 
 TEST_CASE("steps too long for a membrane are refused, and the longest that is not is stable", "[coupling][force]") {
-  const bool slip = GENERATE(false, true);
+  const auto [slip, pressure] = GENERATE(std::pair{false, Pressure::spread}, std::pair{true, Pressure::spread},
+                                         std::pair{false, Pressure::sharp}, std::pair{true, Pressure::sharp});
   Case scene = sheared_cell(1000, 4000, slip);
+  scene.coupling->pressure = pressure;
   const std::string text = refusal(scene);
   CHECK(text.find("time.step_us: steps of 1e+03 us are too long") != std::string::npos);
   CHECK((text.find("coupling.slip = false") != std::string::npos) == slip);
@@ -177,6 +184,36 @@ TEST_CASE("a capsule five times as viscous inside deforms as by a boundary integ
   // 2.2 % more in this box, measured in one of ten radii beside.
   CHECK(shape.taylor == Approx(0.0891).epsilon(0.03));
   CHECK(shape.angle_deg == Approx(38.1).margin(1.5));
+}
+
+TEST_CASE("a capsule deforms the same where its pressure jumps", "[coupling][force][sharp]") {
+  const auto deform = [](Pressure pressure, int vertices) {
+    ShearedCapsule capsule;
+    capsule.box = 6, capsule.step = 0.02, capsule.slip = false, capsule.vertices = vertices;
+    Case scene = capsule.scene(0.4);
+    scene.coupling->pressure = pressure;
+    Timers timers;
+    FlowSimulation simulation(Comm(), scene, timers);
+    while (!simulation.done()) simulation.step();
+    return deformation(body_mesh(*simulation.surfaces(), 0));
+  };
+  const Deformation spread = deform(Pressure::spread, 500), sharp = deform(Pressure::sharp, 500);
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("D {:.4f} and {:.4f}, {:.2f} and {:.2f} degrees", spread.taylor, sharp.taylor,
+                                                      spread.angle_deg, sharp.angle_deg));
+  CHECK(sharp.taylor == Approx(spread.taylor).epsilon(0.03));
+  CHECK(sharp.angle_deg == Approx(spread.angle_deg).margin(1));
+}
+
+TEST_CASE("triangles that reach too far for a pressure that jumps are refused", "[coupling][force][sharp]") {
+  Case scene = sheared_cell(10, 100, false);
+  scene.coupling->pressure = Pressure::sharp;
+  scene.grid->nodes[0] = 121;  // an edge is fourteen spacings along x
+  scene.cells[0].vertices = 200;
+  scene.cells[0].center_um = {5, 0, 0};  // astride the side of the block
+  const std::string text = refusal(scene);
+  INFO(text);
+  CHECK(text.find("where the pressure jumps cannot be told") != std::string::npos);
+  CHECK(text.find("cells.vertices") != std::string::npos);
 }
 
 TEST_CASE("a cell beyond a wall is refused by name", "[coupling][force]") {

@@ -105,8 +105,11 @@ void on_first_ranks(int count, const Work& work) {
 }  // namespace
 
 TEST_CASE("cells cross ranks and periodic sides, and nothing shows that they do", "[coupling][cells][ranks]") {
-  const bool viscous = GENERATE(false, true);
-  const Case scene = carried_capsules(viscous ? 1500 : 3000, viscous);
+  using Pressure = CouplingSettings::Pressure;
+  const auto [viscous, pressure] =
+      GENERATE(std::pair{false, Pressure::spread}, std::pair{true, Pressure::spread}, std::pair{true, Pressure::sharp});
+  Case scene = carried_capsules(viscous ? 1500 : 3000, viscous);
+  scene.coupling->pressure = pressure;
   const Outcome shared = run(Comm(), scene);
   double along_x = 0, along_z = 0;
   for (const Triple& laps : shared.laps) along_x += laps[0], along_z += laps[2];

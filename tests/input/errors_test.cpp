@@ -252,10 +252,12 @@ TEST_CASE("cells and bodies are checked") {
   const std::string force = "[coupling]\nscheme = \"force\"\n";
   REQUIRE(cell(force + "kernel = \"four-point\"\nslip = false") == "accepted");
   require_parts(cell(force + "kernel = \"two-point\""), {":14: coupling.kernel", "\"three-point\", \"four-point\""});
+  REQUIRE(cell(force + "pressure = \"sharp\"") == "accepted");
+  require_parts(cell(force + "pressure = \"smeared\""), {":14: coupling.pressure", "\"spread\", \"sharp\""});
   for (const char* key : {"tolerance = 0.001", "max_iterations = 10", "robin_in_iterated = true", "acceleration = \"aitken\""})
     require_parts(cell(force + key), {":14: coupling." + std::string(key), "only scheme = \"iterated\""});
   require_parts(cell(force + "robin_coefficient_pg_per_um2_per_us = 1"), {":14: coupling.robin_coefficient", "move with the fluid"});
-  for (const char* key : {"kernel = \"three-point\"", "slip = true"})
+  for (const char* key : {"kernel = \"three-point\"", "slip = true", "pressure = \"spread\""})
     require_parts(cell("[coupling]\n" + std::string(key)), {":13: coupling." + std::string(key), "only scheme = \"force\""});
   REQUIRE(cell("membrane_viscosity_N_s_per_m = 1e-7\nviscosity_ratio = 5\n" + force) == "accepted");
   for (const char* key : {"viscosity_ratio = 0.05", "viscosity_ratio = 60"})

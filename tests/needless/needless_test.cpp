@@ -33,6 +33,7 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
     {"transfer of forces", {"corpuscle::transfer::"}},
     {"slip correction", {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::transfer::slip_power",
                          "corpuscle::membrane::stiffening", "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"}},
+    {"sharp pressure", {"corpuscle::transfer::jump"}},
     {"viscosity ratio", {"corpuscle::transfer::inside", "corpuscle::fluid::excess"}},
     {"contact", {"corpuscle::contact::"}},
     {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
@@ -227,6 +228,9 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   }
   SECTION("straight tube, membranes as forces, and cytosol") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cells.0.viscosity_ratio=5"});
+  }
+  SECTION("straight tube, membranes as forces, and a pressure that jumps") {
+    check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "coupling.pressure=sharp"});
   }
   SECTION("straight tube, membranes as forces that touch") {
     check_flow("straight_tube", {tube, "coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "contact.range_um=0.25"}, 3);

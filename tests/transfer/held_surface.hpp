@@ -25,13 +25,15 @@ inline TriangleMesh ellipsoid_mesh(const Triple& semi_axes, const Triple& center
 class HeldSurface {
  public:
   HeldSurface(const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries, const FluidSettings& settings,
-              const TriangleMesh& mesh, CouplingSettings::Kernel kernel)
+              const TriangleMesh& mesh, CouplingSettings::Kernel kernel, bool sharp_pressure = false)
       : grid(Comm(), nodes, periodic(boundaries)),
         fluid(grid, settings, boundaries),
         surface(make_surface_set({mesh})),
         transfer(grid, boundaries, kernel, surface.vertices),
         force("corpuscle::test::force", surface.vertices, 3),
-        velocity("corpuscle::test::velocity", surface.vertices, 3) {
+        velocity("corpuscle::test::velocity", surface.vertices, 3),
+        sharp(sharp_pressure) {
+    if (sharp) transfer.sharpen_pressure();
     fluid.set_face_force(transfer.faces());
     fluid.raise_reference_speed(1);
   }
@@ -53,12 +55,18 @@ class HeldSurface {
   /// Steps of the fluid with the surface where it is.
   void settle(int steps, double dt_us, bool slip = false) {
     transfer.place(surface.x);
-    transfer.spread(force);
+    spread();
     for (int s = 0; s < steps; ++s) {
       fluid.begin_step(dt_us);
       fluid.solve((s + 1) * dt_us, nullptr);
     }
     take_velocity(slip);
+  }
+  void spread() {
+    if (sharp)
+      transfer.spread(force, surface);
+    else
+      transfer.spread(force);
   }
   void take_velocity(bool slip) {
     const SlipViews correction = transfer.slip(surface, force, fluid.viscosity());
@@ -104,6 +112,7 @@ class HeldSurface {
   SurfaceSet surface;
   Transfer transfer;
   Components<double> force, velocity;
+  bool sharp;
 
  private:
   static std::array<bool, 3> periodic(const std::vector<BoundarySettings>& boundaries) {

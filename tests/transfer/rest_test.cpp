@@ -70,6 +70,66 @@ TEST_CASE("membranes under a uniform normal load leave the fluid at rest", "[tra
   CHECK(rest.jump == Approx(1).epsilon(3e-3));
 }
 
+TEST_CASE("a pressure that jumps leaves the fluid at rest on any grid, with one value inside and one outside",
+          "[transfer][sharp][ranks]") {
+  // Walls all round, and a tube whose circles leave the lines of its grid aslant; a is 1 um, or 0.4 um on a grid that is warped.
+  struct Setting {
+    NodeSource nodes;
+    Triple center;
+    double a, h;
+  };
+  const auto cube = [](int cells, double half) {
+    auto nodes = box({cells, cells, cells}, {half, half, half});
+    nodes.lower_um = {-half, -half, -half};
+    return make_node_source(nodes);
+  };
+  GridSettings tube;
+  tube.generator = GridSettings::Generator::straight_tube;
+  tube.diameter_um = 4, tube.length_um = 4, tube.nodes = {21, 21, 21};
+  const int which = GENERATE(0, 1, 2, 3);
+  const Setting s = which == 0   ? Setting{cube(20, 2), {0.03, -0.02, 0.01}, 1, 0.2}
+                    : which == 1 ? Setting{cube(30, 1.5), {0.03, -0.02, 0.01}, 1, 0.1}
+                    : which == 2 ? Setting{make_node_source(tube), {0.13, 0.12, -0.01}, 1, 0.2}
+                                 : Setting{warped_box({25, 25, 25}), {1.03, 1.04, 1.02}, 0.4, 0.08};
+  const Triple shape = GENERATE(Triple{1, 1, 1}, Triple{1.3, 1, 0.77});
+  const Triple axes{s.a * shape[0], s.a * shape[1], s.a * shape[2]};
+  const auto closed = sides({Type::wall, Type::wall, Type::wall, Type::wall, Type::wall, Type::wall});
+  HeldSurface held(s.nodes, closed, stokes(), ellipsoid_mesh(axes, s.center, 0.7 * s.h), Kernel::three_point, true);
+  held.set_force([](const Vec3&, const Vec3& area) { return area; });
+  held.settle(10, 40 * s.h * s.h);
+  double in_cells = 0, within = 0, farthest[2] = {0, 0}, middle = 0;
+  const auto each = [&](const auto& use) {
+    held.visit_cells([&](const Vec3& x, double p, const Vec3& u) {
+      const double r = std::sqrt(std::pow((x.x - s.center[0]) / axes[0], 2) + std::pow((x.y - s.center[1]) / axes[1], 2) +
+                                 std::pow((x.z - s.center[2]) / axes[2], 2));
+      use(r, p, norm(u));
+    });
+  };
+  double low = 1e300, high = -1e300;
+  each([&](double, double p, double u) { low = std::min(low, p), high = std::max(high, p), in_cells = std::max(in_cells, u); });
+  const Comm& comm = held.grid.comm();
+  low = comm.min(low), high = comm.max(high), in_cells = comm.max(in_cells);
+  middle = 0.5 * (low + high);
+  each([&](double r, double p, double) {
+    // Triangles are chords: what is that near to the surface may be on either side.
+    if (std::abs(r - 1) > 0.02) within += (p > middle) != (r > 1);
+    double& far = farthest[p > middle ? 1 : 0];
+    far = std::max(far, p > middle ? high - p : p - low);
+  });
+  const double largest = held.largest_vertex_speed();
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("grid {}, {} vertices: {:.3g} at vertices, {:.3g} in cells, pressure {:.6f}, within {:.2g} and {:.2g}", which,
+                     held.surface.vertices, largest, in_cells, high - low, comm.max(farthest[0]), comm.max(farthest[1])));
+  // Of load x a / mu, and of the load. Ten steps after it has set in the pressure is still up to 1.3 % off in some cells beside the
+  // surface, where spread forces would leave half of the load.
+  CHECK(largest < 3e-4 * s.a);
+  CHECK(in_cells < 3e-4 * s.a);
+  CHECK(high - low == Approx(1).epsilon(3e-3));
+  CHECK(comm.max(farthest[0]) < 0.02);
+  CHECK(comm.max(farthest[1]) < 0.02);
+  CHECK(comm.sum(within) == 0);
+}
+
 TEST_CASE("the slip correction gives spheres their size, whatever the spacings and the direction", "[transfer]") {
   // A uniform force over a sphere in a periodic box moves it with U = F / (6 pi mu) (1 / a - 2.8373 / L + 4 pi / 3 a^2 / L^3):
   // Hasimoto, J. Fluid Mech. 5, 1959, without the terms of a rigid sphere's uneven traction.
