@@ -62,8 +62,10 @@ KOKKOS_INLINE_FUNCTION std::int64_t floor_units(std::int64_t a) { return a >> in
 
 /// Calls visit(crossing, first cell of the line) for the lines along d through cells of the block that a triangle meets.
 /// @param corner  [corner][direction] in units
+/// @param beside  1: as for corners half a unit higher along all directions, so that none is in a plane of centres
 template <class Visit>
-KOKKOS_INLINE_FUNCTION void visit_crossings(const IndexSpace& index, const std::int64_t (&corner)[3][3], int d, const Visit& visit) {
+KOKKOS_INLINE_FUNCTION void visit_crossings(const IndexSpace& index, const std::int64_t (&corner)[3][3], int d, int beside,
+                                            const Visit& visit) {
   const int e = (d + 1) % 3, f = (d + 2) % 3, plane[2] = {e, f};
   int first[2], last[2];
   for (int m = 0; m < 2; ++m) {
@@ -82,8 +84,8 @@ KOKKOS_INLINE_FUNCTION void visit_crossings(const IndexSpace& index, const std::
     for (int a = first[0]; a <= last[0]; ++a) {
       std::int64_t relative[3][2];
       for (int k = 0; k < 3; ++k) {
-        relative[k][0] = corner[k][e] - a * inside_unit;
-        relative[k][1] = corner[k][f] - b * inside_unit;
+        relative[k][0] = 2 * (corner[k][e] - a * inside_unit) + beside;
+        relative[k][1] = 2 * (corner[k][f] - b * inside_unit) + beside;
       }
       const Crossing crossing = cross_triangle(relative, along);
       if (crossing.sign == 0) continue;

@@ -27,7 +27,7 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
                                           const Array<int>& part) {
   const IndexSpace& index = lattice.index;
   constexpr std::int64_t half = inside_unit / 2;
-  visit_crossings(index, corner, d, [&](const Crossing& crossing, const int (&line)[3]) {
+  visit_crossings(index, corner, d, 0, [&](const Crossing& crossing, const int (&line)[3]) {
     std::int64_t from_side = crossing.at + half;  // of the block
     if (lattice.boundary_above[d] && from_side >= index.n[d] * inside_unit) from_side = index.n[d] * inside_unit - 1;
     const std::int64_t cell = floor_units(from_side);

@@ -1,7 +1,7 @@
-// The part of a membrane's force that its normal carries as a jump of the pressure: not smeared out, but the difference of pressure
-// across the faces whose grid lines, between the centres of cells, a triangle cuts. Of a uniform load these differences are those of
-// a pressure that is one inside and another outside, cell by cell, on any grid: it is balanced exactly. Sums are of integers, so that
-// bits do not depend on their order.
+// The part of a membrane's force that its normal carries as a jump of the pressure: not smeared out, but the difference of
+// pressure across the faces whose grid lines, between the centres of cells, a triangle cuts. Of a uniform load these are the
+// differences of a pressure that is one inside and another outside, cell by cell, on any grid: it is balanced exactly. Sums are of
+// integers, so that bits do not depend on their order.
 #pragma once
 
 #include <cmath>
@@ -30,7 +30,8 @@ KOKKOS_INLINE_FUNCTION VertexArea vertex_area(const SurfaceSet& set, int v) {
   return area;
 }
 
-/// jump [vertex], kPa, of the pressure from inside to outside = the part of the forces [vertex, 3], nN, along the normal, over the area.
+/// jump [vertex], kPa, of the pressure from inside to outside = the part of the forces [vertex, 3], nN, along the normal, over
+/// the area.
 inline void normal_loads(const SurfaceSet& surface, const Components<double>& force, const Array<double>& jump) {
   const SurfaceSet set = surface;
   const auto f = force;
@@ -44,8 +45,8 @@ inline void normal_loads(const SurfaceSet& surface, const Components<double>& fo
       });
 }
 
-/// smooth [vertex] = the mean over the triangles around each vertex. A grid line a spacing from the next sees of a load that changes
-/// from vertex to vertex too much or too little; what is taken off is spread.
+/// smooth [vertex] = the mean over the triangles around each vertex. Of a load that changes from vertex to vertex, grid lines a
+/// spacing apart see too much or too little; what is taken off is spread.
 inline void smooth_loads(const SurfaceSet& surface, const Array<double>& jump, const Array<double>& smooth) {
   const SurfaceSet set = surface;
   const auto in = jump, out = smooth;
@@ -80,13 +81,14 @@ inline double largest_jump(int vertices, const Array<double>& of_vertex) {
   return most;
 }
 
-/// Which of the two faces beside the centre of the `nearest` cell of a line a crossing lies on: the one below (0) or above (1). By the
-/// side of the triangle's plane that the centre is on, which is the same for the lines of all directions through it: else a centre
-/// within rounding of the surface would be inside along one and outside along another.
+/// On which of the two faces beside the nearest centre a crossing of a line lies: the one below (0) or above (1). By the side of
+/// the triangle's plane that the centre is on, which is the same for the lines of all directions through it: else a centre within
+/// rounding of the surface would be inside along one and outside along another. Corners are half a unit higher than they say: where
+/// one were a centre itself, its triangles would not agree.
 KOKKOS_INLINE_FUNCTION int beyond_centre(const std::int64_t (&corner)[3][3], const int (&centre)[3], int sign) {
   Vec3 relative[3];
   for (int k = 0; k < 3; ++k)
-    for (int m = 0; m < 3; ++m) relative[k][m] = static_cast<double>(corner[k][m] - centre[m] * inside_unit);
+    for (int m = 0; m < 3; ++m) relative[k][m] = static_cast<double>(2 * (corner[k][m] - centre[m] * inside_unit) + 1);
   const bool inside = dot(relative[0], cross(relative[1], relative[2])) >= 0;
   return inside == (sign < 0) ? 1 : 0;
 }
@@ -128,12 +130,10 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
       "corpuscle::transfer::jump_sum", Policy(0, set.triangles), KOKKOS_LAMBDA(int t) {
         const IndexSpace& index = s.lattice.index;
         std::int64_t corner[3][3];
-        for (int k = 0; k < 3; ++k) {
+        for (int k = 0; k < 3; ++k)
           if (!place_in_units(s, places, triangle(t, k), corner[k])) return;
-          for (int m = 0; m < 3; ++m) corner[k][m] += 1;  // scenes like to have vertices right in planes of centres
-        }
         if (beyond_block(index, corner)) return;
-        visit_crossings(index, corner, d, [&](const Crossing& crossing, const int (&line)[3]) {
+        visit_crossings(index, corner, d, 1, [&](const Crossing& crossing, const int (&line)[3]) {
           int centre[3] = {line[0], line[1], line[2]};
           centre[d] = static_cast<int>(floor_units(crossing.at + inside_unit / 2));
           const int row = centre[d] + beyond_centre(corner, centre, crossing.sign);
@@ -146,8 +146,9 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
       });
 }
 
-/// across += sums / scale, at faces of direction d of this rank.
-inline void add_jumps(const IndexSpace& index, int d, const Array<std::int64_t>& sums, double scale, const Array<double>& across) {
+/// across += sums / scale at faces of direction d of this rank.
+inline void add_jumps(const IndexSpace& index, int d, const Array<std::int64_t>& sums, double scale,
+                      const Array<double>& across) {
   const auto sum = sums;
   const auto to = across;
   const double factor = 1 / scale;

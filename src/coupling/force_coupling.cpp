@@ -136,8 +136,8 @@ void ForceCoupling::check_jumps(double time) {
   together([&] {
     if (transfer_->reach_too_far(surfaces()))
       throw ComputationError(fmt::format(
-          "where the pressure jumps cannot be told at {:.6g} us: a triangle of a membrane reaches over more than two spacings of the "
-          "grid. Use more vertices (cells.vertices), a coarser grid (grid.nodes), or coupling.pressure = \"spread\"",
+          "where the pressure jumps cannot be told at {:.6g} us: a triangle of a membrane reaches over more than two spacings of "
+          "the grid. Use more vertices (cells.vertices), a coarser grid (grid.nodes), or coupling.pressure = \"spread\"",
           time));
   });
 }
