@@ -99,6 +99,8 @@ class Coupling {
   virtual RigidBodies* rigid_bodies() { return nullptr; }
   /// The search and the flow at surfaces that cut the grid; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
+  /// Of cells on sides that move, past the fluid, nW: what spreads their forces reaches a side beside them.
+  virtual double power_on_sides() { return 0; }
 };
 
 /// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to

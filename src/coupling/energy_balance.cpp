@@ -50,6 +50,7 @@ void EnergyBalance::sample(double elastic_fJ) {
     now.dissipation -= fluid.viscosity() * surface_gradient_work(*surfaces);
   } else if (surfaces) {
     now.on_cells = simulation_.coupling()->power_on_cells();
+    now.boundaries -= simulation_.coupling()->power_on_sides();
     now.dissipation += simulation_.coupling()->unresolved_dissipation();
     now.pushed = simulation_.coupling()->power_of_pushes();
     now.contact = simulation_.coupling()->contact_energy(simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us());

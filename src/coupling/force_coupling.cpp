@@ -425,6 +425,13 @@ double ForceCoupling::unresolved_dissipation() {
   return fluid_.grid().comm().sum(loss);
 }
 
+double ForceCoupling::power_on_sides() {
+  const auto moves = [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::moving_wall; };
+  if (std::none_of(scene_.boundaries.begin(), scene_.boundaries.end(), moves)) return 0;
+  const Components<double> room(uninitialised("corpuscle::coupling::beside_sides"), surfaces().vertices, 3);
+  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), fluid_.velocity(), room));
+}
+
 const Components<double>& ForceCoupling::tractions_for_output() {
   const std::size_t vertices = membranes_->vertices();
   traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);

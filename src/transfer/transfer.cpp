@@ -8,6 +8,7 @@
 #include "transfer/pressure_jump.hpp"
 #include "transfer/sharpen.hpp"
 #include "transfer/transfer_kernels.hpp"
+#include "transfer/vertex_forces.hpp"
 
 namespace corpuscle {
 
@@ -229,6 +230,21 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
   }
   with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity); });
   if (slip) add_slip(block_, *slip, markers_, velocity);
+}
+
+/// What vertices have of the sides' velocities is what they have where all fluxes are zero.
+double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u, const Components<double>& room) {
+  weighed_ = false;
+  weigh();
+  const bool sharp = moment_ > 0;
+  for (int d = 0; d < 3; ++d) {
+    if (!raw_[d].data()) raw_[d] = Array<double>("corpuscle::transfer::raw_face", block_.index().size());
+    Kokkos::deep_copy(raw_[d], 0.0);
+    if (sharp) sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
+  }
+  Kokkos::deep_copy(room, 0.0);
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : raw_, u, markers_, room); });
+  return power_of(places_.vertices, force, room);
 }
 
 SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
