@@ -154,6 +154,14 @@ def fault(setup, run):
     return None
 
 
+def told_amiss(setup, run):
+    """What a run with membranes as forces has told of itself that makes its figures doubtful, or ""."""
+    if not setup.checks:
+        return ""
+    told = [f"{w['figure']} = {w['value']:.2g}" for w in run.report["warnings"] if w["figure"].startswith(("energy", "crossings"))]
+    return "told: " + ", ".join(told) if told else ""
+
+
 def outline(reference, factor=1.0):
     """Judge by the distance of the surfaces to the run `reference(setup)`."""
     def judge(study, setup, run):
