@@ -14,8 +14,9 @@ namespace corpuscle {
 
 namespace {
 
-/// What means are taken of; then the hematocrit of each bin, and then its velocity.
-enum Quantity { hematocrit, mean_speed, cell_speed, discharge, viscosity, layer, first_bin };
+/// What means are taken of; then the hematocrit of each bin, and then its velocity. Drag: stress of walls that move past
+/// each other, towards where they go.
+enum Quantity { hematocrit, mean_speed, cell_speed, discharge, drag, wall_rate, layer, first_bin };
 
 const double unknown = std::nan("");
 
@@ -34,7 +35,17 @@ void add_ranks(const Comm& comm, const View& host, std::vector<double>& values) 
   comm.sum(values.data(), static_cast<int>(values.size()));
 }
 
-nlohmann::json number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+/// A fixed time, whatever steps there are: means are over time. No sample is more often than whole steps are: the first ones,
+/// which may be shorter, would count for more.
+double sampling_interval(const Case& scene) {
+  constexpr double seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
+  const double step = scene.time.step_us, asked = scene.blood->sample_every_us;
+  return asked > 0 ? std::max(asked, step) : seldom * step;
+}
+
+std::string to_text(double value, const std::string& unit) {
+  return fmt::format("{:.3g}{}", value, unit.empty() ? "" : unit == "_um" ? " um" : " mm/s");
+}
 
 }  // namespace
 
@@ -42,7 +53,9 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
     : simulation_(simulation),
       settings_(*scene.blood),
       boundaries_(scene.boundaries),
+      every_us_(sampling_interval(scene)),
       flow_(find_guided_flow(scene, simulation.fluid())) {
+  if (!flow_) no_flow_ = why_unguided(scene);
   if (flow_) frame_ = flow_->frame;
   if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
   bins_ = !frame_.guided() ? 0 : settings_.bins > 0 ? settings_.bins : default_bins(scene, *flow_, simulation.grid());
@@ -105,12 +118,10 @@ void BloodSampler::make_profile() {
 }
 
 bool BloodSampler::due() const {
-  const double now = simulation_.time(), before = now - simulation_.last_step_us(), every = settings_.sample_every_us;
+  const double now = simulation_.time(), before = now - simulation_.last_step_us();
   constexpr double rounding = 1e-9;
-  constexpr long seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
   if (now < settings_.from_us * (1 - rounding)) return false;
-  if (every <= 0) return simulation_.steps() % seldom == 0;
-  return std::floor(now / every + rounding) > std::floor(before / every + rounding);
+  return std::floor(now / every_us_ + rounding) > std::floor(before / every_us_ + rounding);
 }
 
 /// Volumes and flows of the cells, of all ranks.
@@ -148,8 +159,8 @@ void BloodSampler::measure_layer() {
   last_.cell_free_layer_um = cell_free_layer(frame_, windows_, edge.data());
 }
 
-/// Stress on the walls over that of plasma at the same shear rate.
-double BloodSampler::wall_viscosity() {
+/// Stress on the walls, kPa, and the rate at which they move past each other, 1/us.
+BloodSampler::WallShear BloodSampler::wall_shear() {
   const FluidSolver& fluid = simulation_.fluid();
   Grid& grid = simulation_.grid();
   const int d = flow_->across;
@@ -169,7 +180,7 @@ double BloodSampler::wall_viscosity() {
   const double rate = dot(velocity[1] - velocity[0], frame_.tangent) / frame_.width;
   const double stress =
       0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
-  return rate != 0 ? stress / (fluid.viscosity() * rate) : unknown;
+  return {stress, rate};
 }
 
 const BloodSample& BloodSampler::sample() {
@@ -189,11 +200,19 @@ const BloodSample& BloodSampler::sample() {
   last_.discharge_hematocrit = last_.hematocrit * last_.cell_speed / last_.mean_speed;
   last_.relative_viscosity = unknown;
   if (plasma_speed_ != 0) last_.relative_viscosity = plasma_speed_ / last_.mean_speed;
-  if (flow_ && flow_->sheared && frame_.guided()) last_.relative_viscosity = wall_viscosity();
+  WallShear walls{unknown, unknown};
+  if (by_walls()) walls = wall_shear();
+  if (std::abs(walls.rate) > 0) last_.relative_viscosity = walls.stress / (simulation_.fluid().viscosity() * walls.rate);
   last_.cell_free_layer_um = unknown;
   if (windows_ > 0) measure_layer();
-  std::vector<double> values{last_.hematocrit,           last_.mean_speed,         last_.cell_speed,
-                             last_.discharge_hematocrit, last_.relative_viscosity, last_.cell_free_layer_um};
+  const bool moving = std::abs(walls.rate) > 0;  // at rest there is no viscosity to see
+  std::vector<double> values{last_.hematocrit,
+                             last_.mean_speed,
+                             last_.cell_speed,
+                             last_.discharge_hematocrit,
+                             moving ? std::copysign(1, walls.rate) * walls.stress : unknown,
+                             moving ? std::abs(walls.rate) : unknown,
+                             last_.cell_free_layer_um};
   for (int b = 0; b < bins_; ++b)
     values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) /
                      bin_volume_[b]);
@@ -208,7 +227,8 @@ const BloodSample& BloodSampler::sample() {
 
 /// Why a figure is missing, and how those that are there were found.
 void BloodSampler::add_notes(nlohmann::json& block) const {
-  auto& missing = block["left_out"] = nlohmann::json::object();
+  if (!block.contains("left_out")) block["left_out"] = nlohmann::json::object();
+  auto& missing = block["left_out"];
   const auto leave = [&](const char* name, const std::string& why) {
     if (!block.contains(name)) missing[name] = why;
   };
@@ -216,15 +236,85 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
     missing["all"] = "nothing was sampled: the run ended before blood.from_us";
     return;
   }
-  const std::string no_flow = "no flow is driven through the grid in one direction";
-  leave("discharge_hematocrit", no_flow);
-  leave("mean_speed_mm_per_s", no_flow);
-  leave("cell_speed_mm_per_s", no_flow);
-  leave("relative_apparent_viscosity", flow_ ? flow_->no_viscosity : no_flow);
-  leave("cell_free_layer_um", "the flow has no walls to the sides");
+  const std::string undriven = "no flow is driven through the grid in one direction" + (flow_ ? "" : ": " + no_flow_);
+  const std::string still = flow_ && flow_->driven ? "nothing flowed" : undriven;
+  leave("discharge_hematocrit", still);
+  leave("mean_speed_mm_per_s", still);
+  leave("cell_speed_mm_per_s", still);
+  leave("relative_apparent_viscosity", !flow_                          ? undriven
+                                       : !flow_->no_viscosity.empty() ? flow_->no_viscosity
+                                       : by_walls()                   ? "the walls were at rest at all samples"
+                                                                      : "nothing flowed");
+  leave("cell_free_layer_um", frame_.guided() ? "there was no cell along the flow at any sample"
+                              : flow_         ? "the flow has no walls to the sides"
+                                              : undriven);
   leave("smallest_gap_um", "there is no [contact], or nothing came near");
   leave("crossings", "there is no [contact]");
   if (missing.empty()) block.erase("left_out");
+}
+
+/// A figure, the standard error of its mean or why that is not known, and for how many samples its own count.
+void BloodSampler::put_figure(nlohmann::json& block, const Figure& figure) const {
+  if (!std::isfinite(figure.value)) return;
+  const RunningMean& series = means_.of(figure.series);
+  const std::string error_name = figure.name + "_error" + figure.unit;
+  block[figure.name + figure.unit] = figure.value;
+  if (series.samples() < samples())
+    block["samples_left_out"][figure.name] =
+        fmt::format("{} of {}, in which it has no value", samples() - series.samples(), samples());
+  const double time = series.correlation() * every_us_, effective = series.effective_samples();
+  if (figure.known) {
+    block[error_name] = figure.error;
+    block["correlation"][figure.name] = {{"time_us", time}, {"effective_samples", effective}};
+    return;
+  }
+  block[error_name] = nullptr;
+  block["left_out"][error_name] =
+      series.samples() < RunningMean::least_blocks
+          ? fmt::format("{} samples are too few, {} are needed at least", series.samples(), RunningMean::least_blocks)
+          : fmt::format("at least {}: samples are alike for {:.2g} us at least and count for {:.2g} at most, too few to tell; run "
+                        "for longer (time.end_us)",
+                        to_text(figure.error, figure.unit), time, effective);
+}
+
+/// What the walls' drag says; each sample counts with its rate of shear.
+BloodSampler::Figure BloodSampler::viscosity_figure() const {
+  Figure figure{"relative_apparent_viscosity", "", unknown, unknown, false, drag};
+  const double speed = means_.mean(mean_speed);
+  if (plasma_speed_ != 0) {
+    const RunningMean& series = means_.of(mean_speed);
+    figure.series = mean_speed;
+    figure.value = plasma_speed_ / speed;
+    figure.error = std::abs(figure.value / speed) * series.least_error();
+    figure.known = series.error_known();
+  } else if (by_walls()) {
+    const RunningMean &stress = means_.of(drag), &rate = means_.of(wall_rate);
+    const double viscosity = simulation_.fluid().viscosity();
+    figure.value = stress.mean() / (viscosity * rate.mean());
+    figure.error = (stress.least_error() / viscosity + std::abs(figure.value) * rate.least_error()) / rate.mean();
+    figure.known = stress.error_known() && rate.error_known();
+  }
+  return figure;
+}
+
+/// Whether what varies slowest has come to vary by chance only; null where that cannot be told from a slow drift.
+void BloodSampler::put_steady(nlohmann::json& block) const {
+  constexpr double surely = 3;
+  bool drifts = false, all_known = true, any = false;
+  for (const int q : {int(discharge), int(plasma_speed_ != 0 ? mean_speed : drag), int(layer)}) {
+    const RunningMean& series = means_.of(q);
+    if (series.samples() == 0) continue;
+    const double drift = series.drift_over_chance();
+    any = true;
+    all_known = all_known && series.error_known() && std::isfinite(drift);
+    drifts = drifts || drift > surely;
+  }
+  if (any && (drifts || all_known)) {
+    block["steady"] = !drifts;
+    return;
+  }
+  block["steady"] = nullptr;
+  block["left_out"]["steady"] = any ? "the samples are too few, or too much alike, to tell a drift from chance" : "nothing flows";
 }
 
 nlohmann::json BloodSampler::report() const {
@@ -233,42 +323,29 @@ nlohmann::json BloodSampler::report() const {
   block["from_us"] = settings_.from_us;
   block["samples"] = samples();
   if (samples() == 0) return block;
-  const auto put = [&](const std::string& name, double value) {
-    if (std::isfinite(value)) block[name] = value;
-  };
-  const auto put_with_error = [&](const std::string& name, const std::string& unit, double value, double error) {
-    put(name + unit, value);
-    if (std::isfinite(value)) block[name + "_error" + unit] = number(error);
-  };
+  block["sampled_every_us"] = every_us_;
   const double speed = means_.mean(mean_speed), cells = means_.mean(cell_speed), share = means_.mean(hematocrit);
-  put("tube_hematocrit", share);
-  put_with_error("mean_speed", "_mm_per_s", speed / units::mm_per_s, means_.error(mean_speed) / units::mm_per_s);
-  put_with_error("cell_speed", "_mm_per_s", cells / units::mm_per_s, means_.error(cell_speed) / units::mm_per_s);
-  put_with_error("discharge_hematocrit", "", share * cells / speed, means_.error(discharge));
-  if (plasma_speed_ != 0)
-    put_with_error("relative_apparent_viscosity", "", plasma_speed_ / speed,
-                   std::abs(plasma_speed_ / (speed * speed)) * means_.error(mean_speed));
-  else
-    put_with_error("relative_apparent_viscosity", "", means_.mean(viscosity), means_.error(viscosity));
+  const auto put = [&](const char* name, const char* unit, double value, double scale, Quantity q) {
+    put_figure(block, {name, unit, value, scale * means_.of(q).least_error(), means_.of(q).error_known(), q});
+  };
+  block["tube_hematocrit"] = share;
+  put("mean_speed", "_mm_per_s", speed / units::mm_per_s, 1 / units::mm_per_s, mean_speed);
+  put("cell_speed", "_mm_per_s", cells / units::mm_per_s, 1 / units::mm_per_s, cell_speed);
+  put("discharge_hematocrit", "", share * cells / speed, 1, discharge);
+  put_figure(block, viscosity_figure());
   if (plasma_speed_ != 0) block["plasma_mean_speed_mm_per_s"] = plasma_speed_ / units::mm_per_s;
-  put_with_error("cell_free_layer", "_um", means_.mean(layer), means_.error(layer));
+  put("cell_free_layer", "_um", means_.mean(layer), 1, layer);
   if (block.contains("cell_free_layer_um"))
     block["cell_free_layer_is"] = fmt::format(
         "between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where "
         "there is no "
         "cell along the flow there is no layer",
         frame_.length / windows_, view_count(frame_));
-  bool steady = true, known = false;
-  for (const int q : {int(discharge), int(viscosity), int(layer)}) {
-    const double drift = means_.drift_over_chance(q);
-    constexpr double surely = 3;
-    known = known || std::isfinite(drift);
-    steady = steady && !(drift > surely);
-  }
-  block["steady"] = known ? nlohmann::json(steady) : nlohmann::json();
+  put_steady(block);
   block["errors_are"] = fmt::format(
-      "standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least",
-      RunningMeans::least_blocks);
+      "standard errors over time: the largest from blocks of 1, 2, 4, ... samples of which there are {} at least, where the "
+      "longest know next to nothing of each other",
+      RunningMean::least_blocks);
   return block;
 }
 

@@ -52,12 +52,28 @@ class BloodSampler {
   void measure_cells();
   void measure_flow();
   void measure_layer();
-  double wall_viscosity();
+  struct WallShear {
+    double stress, rate;
+  };
+  WallShear wall_shear();
+  /// Whether the viscosity is to be had from walls that move past each other.
+  bool by_walls() const { return flow_ && flow_->sheared && frame_.guided(); }
+  struct Figure {
+    std::string name, unit;
+    double value, error;
+    bool known;  // the error; else it is larger
+    int series;
+  };
+  Figure viscosity_figure() const;
+  void put_figure(nlohmann::json& block, const Figure& figure) const;
+  void put_steady(nlohmann::json& block) const;
 
   FlowSimulation& simulation_;
   BloodSettings settings_;
   std::vector<BoundarySettings> boundaries_;
+  double every_us_;  // between samples
   std::optional<GuidedFlow> flow_;
+  std::string no_flow_;  // why there is none
   FlowFrame frame_;
   double plasma_speed_ = 0;  // um/us; 0: not known
   int bins_ = 0, windows_ = 0;

@@ -176,6 +176,17 @@ std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid
   return std::nullopt;
 }
 
+std::string why_unguided(const Case& scene) {
+  if (!scene.grid || scene.grid->generator == Generator::file) return "of a grid from a file it is not known where along flow goes";
+  int walls = 0, pairs = 0;
+  for (int e = 0; e < 3; ++e) {
+    const bool low = is_wall(side_of(scene, 2 * e)), high = is_wall(side_of(scene, 2 * e + 1));
+    walls += low + high, pairs += low && high;
+  }
+  if (walls > 0 && (pairs != 1 || walls != 2)) return "there are walls on other sides than two that face each other";
+  return "there is no pressure gradient, no inlet, and no wall that moves along another";
+}
+
 double plasma_speed(const Case& scene, const GuidedFlow& flow) {
   constexpr int along = 4, steps = 5;
   GridSettings piece = *scene.grid;

@@ -23,6 +23,9 @@ struct GuidedFlow {
 /// Nothing where there is no direction of flow: in a box without walls or gradient, on grids from files.
 std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid);
 
+/// Why there is nothing, where there is.
+std::string why_unguided(const Case& scene);
+
 /// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same
 /// grid of four cells along the flow, so that its error is the same as that of the scene and leaves no trace in their
 /// ratio. Every rank does it for itself. @pre flow.gradient is not 0

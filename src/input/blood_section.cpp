@@ -11,7 +11,7 @@ BloodSettings read_blood(Section& s) {
   if (s.node("sample_every_us"))
     b.sample_every_us = s.number("sample_every_us", positive());
   else
-    s.describe("sample_every_us", "a number above 0", "every tenth step");
+    s.describe("sample_every_us", "a number above 0", "ten times time.step_us");
   if (s.node("bins"))
     b.bins = s.integer("bins", least_bins, most_bins);
   else
