@@ -50,8 +50,8 @@ std::optional<ModuleCost> cost_of(const std::string& module, const Case& scene) 
   if (module == "convection" && nodes) return ModuleCost{5, *nodes * 6 * 8 * 1e-6};
   if (module == "immersed search" && nodes) return ModuleCost{38, *nodes * 51 * 1e-6};
   const auto vertices = vertices_of(scene);
-  if (module == "membrane viscosity" && vertices && !as_forces(scene)) return ModuleCost{3, (18 + 22) * 8 * *vertices * 1e-6};
-  if (module == "slip correction" && vertices && as_forces(scene)) return ModuleCost{3, (1 + 3) * 8 * *vertices * 1e-6};
+  if (module == "membrane viscosity" && vertices && !as_forces(scene)) return ModuleCost{3, 34 * 8 * *vertices * 1e-6};
+  if (module == "slip correction" && vertices && as_forces(scene)) return ModuleCost{3, 8 * *vertices * 1e-6};
   return std::nullopt;
 }
 
