@@ -14,9 +14,12 @@ struct WallGap {
   Vec3 inward;
 };
 
-/// The wall's plane where the grid line of the lattice point xi along d ends.
+/// The wall's plane where the grid line of the lattice point xi along d ends; far unless the point is within a few of the cells
+/// next to the wall, or within twice the reach by their width: a plane knows nothing of how the wall bends, and in a tube that
+/// turns back cells far away are behind the plane of its end.
 KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p, const double (&xi)[3], int d,
-                                           int end) {
+                                           int end, double reach) {
+  constexpr double few = 4;  // cells
   double at_wall[3] = {xi[0], xi[1], xi[2]};
   at_wall[d] = end == 0 ? -1 : lattice.index.n[d];
   LatticePoint q;
@@ -26,7 +29,8 @@ KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p
   const Vec3 across = cross(tangent[(d + 1) % 3], tangent[(d + 2) % 3]);
   const double toward = dot(across, tangent[d]), length = norm(across);
   WallGap wall;
-  if (!(length > 0)) return wall;
+  const double cells = end == 0 ? xi[d] + 1 : lattice.index.n[d] - xi[d];
+  if (!(length > 0) || (cells > few && cells * norm(tangent[d]) > reach)) return wall;
   wall.inward = ((toward > 0 ? 1.0 : -1.0) * (end == 0 ? 1.0 : -1.0) / length) * across;
   wall.gap = dot(p - foot, wall.inward);
   return wall;
@@ -46,7 +50,7 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {
       if (!walls.wall[d][end] || !(end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d])) continue;
-      const WallGap wall = gap_to_side(lattice, p, xi, d, end);
+      const WallGap wall = gap_to_side(lattice, p, xi, d, end, reach);
       if (wall.gap < reach && wall.gap < nearest.gap) nearest = wall;
     }
   return nearest;

@@ -3,6 +3,7 @@
 
 #include "immersed/surface_views.hpp"
 #include "transfer/marker_views.hpp"
+#include "transfer/node_bins.hpp"
 
 namespace corpuscle {
 
@@ -10,6 +11,7 @@ struct MarkerSearch {
   Lattice lattice;
   Vec3 lower, upper;  // bounds of the lattice in space, with a margin
   double reach;       // of the kernel
+  NodeBins bins;
 };
 
 /// What is remembered of each vertex from one step to the next. Arrays may have room for more.
@@ -32,9 +34,10 @@ KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const Latti
   }
 }
 
-/// Whether the kernel of a marker touches points of this rank along every direction, and whether it is beyond a side.
+/// Whether the kernel of a marker touches points of this rank along every direction, and whether it is beyond a side, by about
+/// a cell at most: what is farther is elsewhere in the grid, where that bends, or nowhere.
 KOKKOS_INLINE_FUNCTION bool reaches(const MarkerSearch& s, const double (&eta)[3], bool& beyond) {
-  constexpr double on_side = 1e-9;
+  constexpr double on_side = 1e-9, a_cell = 1;
   beyond = false;
   bool near = true;
   for (int d = 0; d < 3; ++d) {
@@ -42,21 +45,47 @@ KOKKOS_INLINE_FUNCTION bool reaches(const MarkerSearch& s, const double (&eta)[3
     const double high = s.lattice.boundary_above[d] ? s.lattice.index.n[d] - 0.5 + on_side : s.lattice.index.n[d] - 1 + s.reach;
     const bool outside = eta[d] < low || eta[d] > high;
     const bool at_side = eta[d] < low ? s.lattice.boundary_below[d] : s.lattice.boundary_above[d];
-    near = near && (!outside || at_side);
+    near = near && (!outside || (at_side && eta[d] >= low - a_cell && eta[d] <= high + a_cell));
     beyond = beyond || (outside && at_side);
   }
   beyond = beyond && near;
   return near && !beyond;
 }
 
-/// A vertex's place in the lattice, from a guess if there is one. @returns false if it is not to be found
-KOKKOS_INLINE_FUNCTION bool locate_vertex(const Lattice& lattice, const Vec3& p, bool guessed, LatticePoint& q) {
-  if (!guessed || lattice.locate(p, q) != Located::inside) {
-    lattice.coarse_start(p, q);
-    if (lattice.locate(p, q) == Located::failed) return false;
+/// Whether a point is no farther beyond sides than the cells next to them are wide.
+KOKKOS_INLINE_FUNCTION bool at_sides(const Lattice& lattice, const LatticePoint& q) {
+  constexpr double most = 4;  // nodes of half cells
+  for (int d = 0; d < 3; ++d) {
+    if (lattice.boundary_below[d] && q.xi(d) < lattice.lower[d] - most) return false;
+    if (lattice.boundary_above[d] && q.xi(d) > lattice.upper[d] + most) return false;
   }
-  lattice.polish(p, q);
   return true;
+}
+
+/// A vertex's place in the lattice, from a guess if there is one, and else from the nearest nodes of different parts of the
+/// grid. A place in it is the right one whatever the start; only without, the nearest one beyond it is.
+/// @returns false if it is not to be found
+KOKKOS_INLINE_FUNCTION bool locate_vertex(const MarkerSearch& s, const Vec3& p, bool guessed, LatticePoint& q) {
+  constexpr int most = 3;
+  if (guessed && s.lattice.locate(p, q) == Located::inside) {
+    s.lattice.polish(p, q);
+    return true;
+  }
+  int starts[most][3];
+  bool found = false;
+  for (int n = 0; n < most; ++n) {
+    if (!nearest_node(s.bins, s.lattice, p, starts, n, starts[n])) break;
+    const double xi[3] = {static_cast<double>(starts[n][0]), static_cast<double>(starts[n][1]), static_cast<double>(starts[n][2])};
+    LatticePoint from;
+    s.lattice.set(from, xi);
+    const Located where = s.lattice.locate(p, from);
+    if (where == Located::failed || (found && where != Located::inside) || !at_sides(s.lattice, from)) continue;
+    q = from;
+    found = true;
+    if (where == Located::inside) break;
+  }
+  if (found) s.lattice.polish(p, q);
+  return found;
 }
 
 KOKKOS_INLINE_FUNCTION bool within_bounds(const MarkerSearch& s, const Vec3& p) {
@@ -80,7 +109,7 @@ inline void find_vertices(const MarkerSearch& search, const Components<double>& 
           const double xi[3] = {out.xi(v, 0), out.xi(v, 1), out.xi(v, 2)};
           s.lattice.set(q, xi);
         }
-        if (!locate_vertex(s.lattice, p, guessed, q)) return;
+        if (!locate_vertex(s, p, guessed, q)) return;
         double eta[3];
         lattice_to_index(s.lattice, q, eta);
         bool outside;
@@ -88,30 +117,6 @@ inline void find_vertices(const MarkerSearch& search, const Components<double>& 
         if (outside) Kokkos::atomic_fetch_min(&out.beyond(0), v);
         out.known(v) = 1;
         for (int d = 0; d < 3; ++d) out.xi(v, d) = q.xi(d);
-      });
-}
-
-/// Vertices that are others than before begin their search where their body's first one is: the search from nothing is long.
-inline void seed_places(const MarkerSearch& search, const SurfaceSet& set, const VertexPlaces& places) {
-  using Team = Kokkos::TeamPolicy<Exec>::member_type;
-  const MarkerSearch s = search;
-  const VertexPlaces out = places;
-  const auto x = set.x;
-  const auto first_vertex = set.first_vertex;
-  Kokkos::parallel_for(
-      "corpuscle::transfer::seed_places", Kokkos::TeamPolicy<Exec>(set.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
-        const int first = first_vertex(team.league_rank()), last = first_vertex(team.league_rank() + 1);
-        Kokkos::single(Kokkos::PerTeam(team), [&]() {
-          LatticePoint q;
-          const bool found = locate_vertex(s.lattice, load(x, first), false, q);
-          out.known(first) = found ? 1 : 0;
-          for (int d = 0; d < 3; ++d) out.xi(first, d) = q.xi(d);
-        });
-        team.team_barrier();
-        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first + 1, last), [&](int v) {
-          out.known(v) = out.known(first);
-          for (int d = 0; d < 3; ++d) out.xi(v, d) = out.xi(first, d);
-        });
       });
 }
 
@@ -155,6 +160,15 @@ inline void fill_markers(const MarkerSearch& search, const VertexPlaces& places,
                  (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
         }
         out.home(marker) = home ? 1 : 0;
+      });
+}
+
+/// Adds one to the first component of what is at home. @param count  [vertex, 3]
+inline void mark_at_home(const MarkerViews& markers, const Components<double>& count) {
+  const MarkerViews m = markers;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::mark_at_home", Policy(0, markers.count), KOKKOS_LAMBDA(int marker) {
+        if (m.home(marker)) count(m.vertex(marker), 0) += 1;
       });
 }
 

@@ -225,6 +225,7 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
   size.cells_listed = static_cast<double>(scene.cells.size());
   size.shared = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
+  size.writes_cells = scene.output.cells;
   size.own = size.vertices;
   if (size.shared) {
     share_cells(scene, ranks, size);
@@ -294,6 +295,10 @@ void require_countable(const SceneSize& size, int ranks) {
   }
   if (size.shared) {
     require_below(3 * 2 * (size.own + size.copies), "the corners of triangles", "use more ranks or fewer cells", "cells");
+    if (size.writes_cells && size.vertices > 2147483647.0)
+      throw InputError(fmt::format("output.cells: {:.3g} vertices, and cells.h5 numbers them up to 2.15e+09: set output.cells = false, or "
+                                   "use fewer cells or vertices",
+                                   size.vertices));
     return;
   }
   // Triangles are twice the vertices; the search numbers them together with the images under which they are seen.

@@ -20,6 +20,7 @@ struct SceneSize {
   double pairs = 0;                  // of the vertices of a cell, over the types of cells that move with the fluid
   double cells_listed = 0;           // cells of the whole scene
   bool shared = false;               // cells are shared out over ranks: coupling.scheme = "force"
+  bool writes_cells = false;         // cells.h5
   double own = 0, copies = 0;        // vertices that a rank holds, of its own cells and of copies of others; all without sharing
 
   double owned() const { return block[0] * block[1] * block[2]; }

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/error.hpp"
 
 namespace corpuscle {
@@ -55,11 +57,14 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
   std::int64_t numbers[2];
   file.read(numbers_name, {2}, numbers);
   const hsize_t total = cells.total(), width = 3 * static_cast<hsize_t>(cells.membranes().carried().size());
+  // With membrane viscosity more is carried, behind the rest; where it is new it begins from zero.
+  const Shape stored = file.shape(carried_name);
+  const hsize_t columns_stored = stored.size() == 2 ? stored[1] : width;
   const hsize_t first = total * comm.rank() / comm.size(), last = total * (comm.rank() + 1) / comm.size();
   std::vector<CellRecord> records;
   std::vector<int> owners;
   std::vector<double> carried;
-  const Shape table_shape{total, columns}, carried_shape{static_cast<hsize_t>(cells.total_vertices()), width};
+  const Shape table_shape{total, columns}, carried_shape{static_cast<hsize_t>(cells.total_vertices()), columns_stored};
   if (last > first) {
     std::vector<std::int64_t> table((last - first) * columns);
     file.read(table_name, table_shape, Slab{{first, 0}, {last - first, columns}}, table.data());
@@ -74,9 +79,12 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
       if (numbers[1] == comm.size()) owners.push_back(static_cast<int>(row[rank]));
       vertices += cells.membranes().types()[cell.type].mesh.vertices.size();
     }
-    carried.resize(vertices * width);
+    std::vector<double> rows(vertices * columns_stored);
     file.read(carried_name, carried_shape,
-              Slab{{static_cast<hsize_t>(records.front().first_vertex), 0}, {vertices, width}}, carried.data());
+              Slab{{static_cast<hsize_t>(records.front().first_vertex), 0}, {vertices, columns_stored}}, rows.data());
+    carried.assign(vertices * width, 0.0);
+    for (hsize_t v = 0; v < vertices; ++v)
+      for (hsize_t c = 0; c < std::min(width, columns_stored); ++c) carried[v * width + c] = rows[v * columns_stored + c];
   }
   cells.restore(records, carried, owners, static_cast<long>(numbers[0]));
 }

@@ -22,8 +22,32 @@ double largest_term(const EnergyTotals& t) {
 /// What the membranes have kept of the work done on them.
 double kept_by_membranes(const EnergyTotals& t) { return t.elastic + t.membrane_dissipation + t.membrane_kinetic; }
 
-std::optional<double> share(double left_over, double scale) {
-  if (scale <= 0) return std::nullopt;
+/// Modulus of a sheet, nN/um.
+double modulus(const MembraneLaw& law) {
+  return std::visit(
+      [](const auto& l) {
+        if constexpr (requires { l.spring; })
+          return l.spring.stiffness;
+        else
+          return l.material.shear_modulus;
+      },
+      law);
+}
+
+/// Below which all terms are rounding of the membranes' energy, fJ.
+double floor_of(FlowSimulation& simulation) {
+  constexpr double rounding = 1e-12;
+  if (!simulation.membranes()) return 0;
+  double most = 0;
+  for (const CellReference& type : simulation.membranes()->types()) {
+    const CellLaw& law = type.law;
+    most = larger(most, law.bending + (modulus(type.in_plane) + law.area + law.local_area) * law.rest_area);
+  }
+  return rounding * most * simulation.cells();
+}
+
+std::optional<double> share(double left_over, double scale, double floor) {
+  if (scale <= floor) return std::nullopt;
   return std::abs(left_over) / scale;
 }
 
@@ -81,11 +105,11 @@ double EnergyBalance::largest_fJ() const { return largest_term(state_.totals); }
 std::optional<double> EnergyBalance::imbalance() const {
   const EnergyTotals& t = state_.totals;
   const double in = t.boundaries + t.gradient + t.pushed;
-  return share(in - t.dissipation - t.kinetic - t.on_bodies - t.contact - kept_by_membranes(t), largest_term(t));
+  return share(in - t.dissipation - t.kinetic - t.on_bodies - t.contact - kept_by_membranes(t), largest_term(t), floor_of(simulation_));
 }
 
 std::optional<double> EnergyBalance::coupling_imbalance() const {
-  return share(state_.totals.on_cells - kept_by_membranes(state_.totals), largest_term(state_.totals));
+  return share(state_.totals.on_cells - kept_by_membranes(state_.totals), largest_term(state_.totals), floor_of(simulation_));
 }
 
 }  // namespace corpuscle

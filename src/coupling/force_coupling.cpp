@@ -51,6 +51,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
     : scene_(without_cells(scene)),
       fluid_(fluid),
       timers_(timers),
+      schedule_(schedule),
       lengths_us_(schedule.lengths_us()),
       workspace_(std::make_shared<Workspace>()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
@@ -73,6 +74,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
 /// The vertices are others than before.
 void ForceCoupling::take_up() {
   transfer_->take_up(surfaces());
+  renewed_ = true;
   Kokkos::deep_copy(membranes_->views().force, 0.0);
   if (!scene_.coupling->slip) return;
   const std::size_t vertices = surfaces().vertices;
@@ -93,15 +95,33 @@ std::string ForceCoupling::vertex_text(int vertex) const {
 /// Where the vertices are in the grid.
 /// @throws ComputationError  if one is outside
 void ForceCoupling::place(double time) {
-  together([&] {
-    const int beyond = transfer_->place(surfaces().x);
-    if (beyond >= 0)
-      throw ComputationError(fmt::format(
-          "{} is outside the grid at {:.6g} us. Likely cause: a cell pressed against a wall, where nothing but the flow keeps it "
-          "away, or a step too long; reduce time.step_us or move the cell (center_um)",
-          vertex_text(beyond), time));
-  });
+  const double beyond = transfer_->place(surfaces().x) >= 0 ? 1 : 0;
+  if (fluid_.grid().comm().max(beyond) > 0 || renewed_) check_all_at_home(time);
+  renewed_ = false;
   watch_outflow();
+}
+
+/// Every vertex must lie in the grid once: one without a place would stand still, and nothing of it reach the fluid.
+/// @throws ComputationError
+void ForceCoupling::check_all_at_home(double time) {
+  const Comm& comm = fluid_.grid().comm();
+  if (comm.sum(static_cast<double>(transfer_->at_home())) == static_cast<double>(vertices())) return;
+  const Components<double> times("corpuscle::coupling::times_at_home", surfaces().vertices, 3);
+  transfer_->mark_at_home(times);
+  cells_->add_copies(times);
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), times);
+  together([&] {
+    for (int v = 0; v < surfaces().own_vertices; ++v)
+      if (host(v, 0) != 1)
+        throw ComputationError(
+            host(v, 0) == 0
+                ? fmt::format("{} is outside the grid at {:.6g} us. Likely cause: a cell pressed against a wall, where nothing but the "
+                              "flow keeps it away, or a step too long; reduce time.step_us or move the cell (center_um)",
+                              vertex_text(v), time)
+                : fmt::format("{} lies in {:g} places of the grid at {:.6g} us, which comes to lie upon itself there: use a wider bend "
+                              "(grid) or a smaller grid.diameter_um",
+                              vertex_text(v), host(v, 0), time));
+  });
 }
 
 void ForceCoupling::watch_outflow() {
@@ -151,14 +171,15 @@ void ForceCoupling::check_start() {
   std::vector<int> types;
   for (const CellRecord& cell : cells_->own()) types.push_back(cell.type);
   std::string wrong;
+  std::vector<CoarseSurface> coarse;
   try {
-    coarse_ = check_surfaces(fluid_.grid(), scene_, surfaces(), types);
+    coarse = check_surfaces(fluid_.grid(), scene_, surfaces(), types);
   } catch (const InputError& error) {
     wrong = error.what();
   }
   wrong = agree(comm, wrong);
   if (!wrong.empty()) throw InputError(wrong);
-  coarse_ = agree(comm, coarse_);
+  coarse_ = warn_of_coarse(worst_of_types(comm, static_cast<int>(membranes_->types().size()), coarse));
   try {
     place(0);
     fill_cells(0);
@@ -166,10 +187,6 @@ void ForceCoupling::check_start() {
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
-  const double home = comm.sum(static_cast<double>(transfer_->at_home())), all = static_cast<double>(vertices());
-  if (home != all)
-    throw InputError(
-        fmt::format("cells: {} of {} vertices are nowhere in the grid: move the cells (center_um) into it", all - home, all));
   outflow_limit_ = scene_.time.stop_before_outflow_um;
   if (outflow_.distance < outflow_limit_) {
     outflow_limit_ = 0.5 * outflow_.distance;
@@ -183,8 +200,13 @@ void ForceCoupling::check_start() {
   measure_stability();
   find_softest();
   if (loads_) loads_->look_at_start(lengths_us_.front());
-  const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (small_) return membranes_->rest_at_size(1);
+  refuse_long_steps();
+}
+
+/// @throws InputError
+void ForceCoupling::refuse_long_steps() const {
+  const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   if (!(longest <= stable_us_))
     throw InputError(
         fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "
@@ -401,18 +423,24 @@ void ForceCoupling::update_copies() {
   cells_->to_copies(surfaces().v);
 }
 
+/// Of the step after one of dt: where steps grow it is longer, and what contact lists must reach further.
+double ForceCoupling::next_step_us(double time, double dt) const {
+  const long tick = schedule_.tick_at(time);
+  return tick >= 0 && tick < schedule_.end() ? schedule_.step_us(tick) : dt;
+}
+
 void ForceCoupling::after_move(double time, double dt) {
   const auto scope = timers_.scope("contact");
   update_copies();
   loads_->limit_approach(time);
-  look(time, dt);
+  look(time, next_step_us(time, dt));
   loads_->note_wall_gap();
 }
 
 void ForceCoupling::resume(double time) {
   if (!loads_) return;
   update_copies();
-  look(time, lengths_us_.front());
+  look(time, next_step_us(time, lengths_us_.front()));
 }
 
 SlipViews ForceCoupling::slip_of_membranes() const {

@@ -59,6 +59,7 @@ class ForceCoupling : public Coupling {
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);
+  void check_all_at_home(double time_us);
   void fill_cells(double time_us);
   bool sharp_pressure() const { return scene_.coupling->pressure == CouplingSettings::Pressure::sharp; }
   void check_jumps(double time_us);
@@ -91,16 +92,21 @@ class ForceCoupling : public Coupling {
   void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
+  void refuse_long_steps() const;
+  double next_step_us(double time_us, double dt_us) const;
 
   Case scene_;
   FluidSolver& fluid_;
   Timers& timers_;
+  StepSchedule schedule_;
   std::vector<double> lengths_us_;  // of all steps there will be
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
   std::optional<PackingReport> packing_;  // only with populations
   std::optional<PackedShare> packed_;
   double packed_gap_ = 0;                 // um, the least of the populations'
+  int packed_listed_ = 0;                 // cells of the scene that are not packed
+  double small_stable_us_ = 0;            // the largest stable step of packed cells before they have grown
   bool grows_ = false;                    // packed cells are still smaller than they are to be, and must grow
   bool small_ = false;                    // or are about to be replaced by those of a checkpoint
   Membranes* membranes_;                        // theirs
@@ -109,6 +115,7 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
   Components<double> followed_;                 // [vertex, 1] share of the forces that slip follows; only with slip
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
+  bool renewed_ = true;       // the vertices are others than at the last place()
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely
   /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.

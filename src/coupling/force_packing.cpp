@@ -27,6 +27,7 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   if (scene.populations.empty()) return;
   packing_ = report_of(scene, places, grid.total_volume());
   packed_ = share_of(places, grid.comm());
+  packed_listed_ = places.names.listed;
   packed_gap_ = 1e30;
   for (const auto& population : scene.populations) packed_gap_ = std::min(packed_gap_, population.gap_um);
   if (places.size == 1) return;
@@ -35,16 +36,46 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   packed_gap_ = 0;
 }
 
+namespace {
+
+/// The smallest gap of which one side at least is a packed cell's: the scene's own may be as near to each other as they please.
+double least_gap_of_packed(const SurfaceSet& set, const ContactLists& lists, const ContactViews& contacts, int listed) {
+  const auto host = [](const auto& view) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view); };
+  const auto first = host(lists.first_group);
+  const auto item = host(contacts.item);
+  const auto gap = host(contacts.gap);
+  const auto number = host(set.number);
+  const auto vertex_body = host(set.vertex_body), triangle_body = host(set.triangle_body);
+  double least = 1e30;
+  for (int v = 0; v < set.vertices; ++v)
+    for (int g = first(v); g < first(v + 1); ++g) {
+      if (item(g) < 0) continue;
+      const int body = vertex_body(v), other = triangle_body(item_triangle(set, item(g)));
+      if (body != other && std::max(number(body), number(other)) >= listed) least = std::min(least, gap(g));
+    }
+  return least;
+}
+
+std::string gap_text(double gap) { return gap < 1e29 ? fmt::format("{:.3g} um", gap) : "far"; }
+
+}  // namespace
+
 /// Of packed cells that have grown: a restart begins with them as small as packing did.
 std::vector<double> ForceCoupling::state() const {
   if (!packed_ || packed_->size == 1) return {};
-  return {stable_us_, softest_.area, softest_.radius};
+  return {stable_us_, softest_.area, softest_.radius, small_stable_us_};
 }
 
+/// The limit of the grown cells, which are not at hand: it changes with properties as that of the small ones does.
+/// @throws InputError  for steps that are longer
 void ForceCoupling::set_state(const std::vector<double>& state) {
-  stable_us_ = state.at(0);
+  constexpr double rounding = 1e-9;  // on other ranks
+  const double change = stable_us_ / state.at(3);
+  small_stable_us_ = stable_us_;
+  stable_us_ = (std::abs(change - 1) < rounding ? 1 : change) * state[0];
   softest_.area = state.at(1);
   softest_.radius = state.at(2);
+  refuse_long_steps();
 }
 
 /// Packing has seen points and tables: here is what the triangles themselves say.
@@ -59,19 +90,22 @@ void ForceCoupling::check_packing() {
   Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
   contact.take_up(surfaces(), membranes_->templates(), membranes_->views().type);
   contact.look_at_start(lengths_us_.front());
-  packing_->smallest_gap_um = contact.report().smallest_gap;
+  packing_->smallest_gap_um =
+      comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
   WallSides sides;
   for (const auto& boundary : scene_.boundaries) {
     const int side = static_cast<int>(boundary.side);
-    sides.wall[side / 2][side % 2] = boundary.type != BoundarySettings::Type::periodic;
+    sides.wall[side / 2][side % 2] =
+        boundary.type == BoundarySettings::Type::wall || boundary.type == BoundarySettings::Type::moving_wall;
   }
   const double to_side =
       sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);
   if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
-  throw InputError(fmt::format("populations: two cells are {:.3g} um from each other, or one {:.3g} um from a side, and gap_um = {:g} is asked "
+  throw InputError(fmt::format("populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "
                                "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
-                               packing_->smallest_gap_um, packing_->smallest_wall_gap_um, packed_gap_));
+                               gap_text(packing_->smallest_gap_um),
+                               gap_text(packing_->smallest_wall_gap_um), packed_gap_));
 }
 
 /// Where shapes at rest have no room, membranes grow to their size from the largest that have, as contact and their own forces
@@ -84,7 +118,10 @@ void ForceCoupling::inflate() {
   info("packing:  shapes at rest fit with {:.3f} of their size; they grow on as membranes", size);
   const auto still = [this] { Kokkos::deep_copy(surfaces().v, 0.0); };
   try {
+    membranes_->rest_at_size(size);
     cells_->to_copies(surfaces().x, true);
+    measure_stability();
+    small_stable_us_ = stable_us_;
     still();
     loads_->look(0, pace_us);
     long step = 0;
@@ -111,7 +148,13 @@ void ForceCoupling::settle_membranes(double size, double& mobility, long step) {
   const Comm& comm = fluid_.grid().comm();
   membranes_->rest_at_size(size);
   begin_step(0, pace_us, 0);
-  if (step % every == 0) mobility = share / (pace_us * comm.max(membranes_->cells() > 0 ? membranes_->largest_stiffness_nN_per_um() : 0));
+  if (step % every == 0) {
+    double stiffness = 0;
+    together([&] {
+      if (membranes_->cells() > 0) stiffness = membranes_->largest_stiffness_nN_per_um();
+    });
+    mobility = share / (pace_us * comm.max(stiffness));
+  }
   membranes_->set_out(0);
   cells_->to_copies(surfaces().x, true);
   together([&] { membranes_->compute_forces(); });

@@ -31,7 +31,7 @@ SharpCoupling::SharpCoupling(const Case& scene, FluidSolver& fluid, Timers& time
 
 void SharpCoupling::check_start() {
   immersed_->boundary().wrap(0, surfaces_->bodies, true);
-  coarse_ = check_surfaces(fluid_.grid(), scene_, *surfaces_);
+  coarse_ = warn_of_coarse(check_surfaces(fluid_.grid(), scene_, *surfaces_));
   try {
     immersed_->update_geometry(starting_gap);
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong

@@ -19,10 +19,22 @@ struct Resolution {
 std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces,
                                            const std::vector<int>& types = {});
 
-/// Warns of bodies that the grid resolves coarsely. Where cells are shared out, each rank looks at its own and at what comes near
-/// its block.
-/// @returns what it warned of, for messages about a run that breaks down later; "" if nothing
+/// A body that the grid resolves coarsely, or a membrane whose mesh is coarser than the grid.
+struct CoarseSurface {
+  int type = -1;  // of a cell that is shared out
+  bool mesh = false;
+  double degree = 0;
+  std::string text;
+};
+
+/// Where cells are shared out, each rank looks at its own and at what comes near its block.
+/// @returns the bodies to warn of
 /// @throws InputError  for a body that is larger than the grid, not resolved by it, inside another or across it
-std::string check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces, const std::vector<int>& types = {});
+std::vector<CoarseSurface> check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces,
+                                          const std::vector<int>& types = {});
+/// Of each type and kind the worst on any rank, the same on all. Every rank calls.
+std::vector<CoarseSurface> worst_of_types(const Comm& comm, int types, const std::vector<CoarseSurface>& here);
+/// @returns all texts, for messages about a run that breaks down later; "" if there are none
+std::string warn_of_coarse(const std::vector<CoarseSurface>& surfaces);
 
 }  // namespace corpuscle

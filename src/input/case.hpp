@@ -201,7 +201,7 @@ struct ContactSettings {
 /// [blood]: what is measured of many cells in a flow
 struct BloodSettings {
   double from_us = 0;                   // sampling begins
-  double sample_every_us = 0;           // 0: every tenth step
+  double sample_every_us = 0;           // 0: ten times time.step_us
   int bins = 0;                         // of profiles; 0: about a spacing wide
   double layer_window_um = 1;           // length of the windows in which the outermost membrane is looked for
 

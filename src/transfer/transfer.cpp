@@ -19,11 +19,12 @@ View make(const char* name, Extents... extents) {
   return View(uninitialised(std::string("corpuscle::transfer::") + name), extents...);
 }
 
-/// Bounds of the lattice in space, widened by one of its links.
+/// Bounds of the lattice in space, widened by one of its links, and its nodes in bins.
 /// @returns the longest link
 double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lattice.x);
-  double link = 0;
+  double link = 0, sum = 0;
+  long links = 0;
   search.lower = {1e300, 1e300, 1e300};
   search.upper = {-1e300, -1e300, -1e300};
   for (int k = lattice.lower[2]; k <= lattice.upper[2]; ++k)
@@ -34,9 +35,13 @@ double find_bounds(const Lattice& lattice, MarkerSearch& search) {
         for (int d = 0; d < 3; ++d) {
           search.lower[d] = std::min(search.lower[d], p[d]);
           search.upper[d] = std::max(search.upper[d], p[d]);
-          if (at[d] < lattice.upper[d]) link = std::max(link, norm(load(x, c + lattice.index.stride(d)) - p));
+          if (at[d] == lattice.upper[d]) continue;
+          const double length = norm(load(x, c + lattice.index.stride(d)) - p);
+          link = std::max(link, length);
+          sum += length, ++links;
         }
       }
+  search.bins = make_node_bins(lattice, search.lower, search.upper, sum / static_cast<double>(links), link);
   search.lower -= {link, link, link};
   search.upper += {link, link, link};
   return link;
@@ -99,10 +104,7 @@ void Transfer::make_places(int vertices) {
   Kokkos::deep_copy(places_.known, static_cast<unsigned char>(0));
 }
 
-void Transfer::take_up(const SurfaceSet& set) {
-  make_places(set.vertices);
-  if (set.bodies > 0) seed_places(search_, set, places_);
-}
+void Transfer::take_up(const SurfaceSet& set) { make_places(set.vertices); }
 
 void Transfer::make_room(int markers) {
   if (markers > room_) {
@@ -261,5 +263,7 @@ double Transfer::marker_radius() const {
 }
 
 int Transfer::at_home() const { return count_at_home(markers_); }
+
+void Transfer::mark_at_home(const Components<double>& count) const { corpuscle::mark_at_home(markers_, count); }
 
 }  // namespace corpuscle

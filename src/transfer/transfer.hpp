@@ -24,7 +24,8 @@ class Transfer {
   /// The vertices are others from now on.
   void take_up(const SurfaceSet& set);
   /// Find the vertices' positions x [vertex, 3], um, in the grid. Must precede the calls below.
-  /// @returns the lowest vertex that is outside the grid on this rank, or -1
+  /// @returns the lowest vertex that is beyond a side of this rank's block by about a cell at most, or -1: outside the grid,
+  ///          unless another part of it, which may be near where it bends, has the vertex at home
   int place(const Components<double>& x);
   /// The forces [vertex, 3], nN, onto faces().
   void spread(const Components<double>& force);
@@ -52,6 +53,8 @@ class Transfer {
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
+  /// Adds one to the first component of each of them in `count` [vertex, 3].
+  void mark_at_home(const Components<double>& count) const;
   /// The widest spacing of this rank's block, um.
   double largest_spacing() const { return largest_spacing_; }
   int markers() const { return markers_.count; }
