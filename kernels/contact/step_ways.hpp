@@ -79,16 +79,16 @@ inline StepWays step_ways(const SurfaceSet& surface, const Components<double>& l
   return ways;
 }
 
-/// The longest way towards or away from each other that one of the first `vertices` and a triangle in its list make in a step,
-/// if it is longer than `least`.
-inline LongestWay longest_approach(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int vertices,
+/// The longest way towards or away from a triangle in its list that one of the first `vertices` makes in a step, if it is longer than
+/// `least` and than their distance: it comes from the other side, or is about to go there.
+inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int vertices,
                                    double dt, double least) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const ContactLists in = lists;
   LongestWay longest;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::longest_approach", Policy(0, vertices),
+      "corpuscle::contact::longest_passage", Policy(0, vertices),
       KOKKOS_LAMBDA(int v, LongestWay& sum) {
         const Vec3 velocity = load(s.v, v);
         for (int e = in.first(v); e < in.first(v + 1); ++e) {
@@ -108,7 +108,7 @@ inline LongestWay longest_approach(const SurfaceSet& surface, const Images& imag
           const double distance = norm(away);
           LongestWay own;
           own.way = distance > 1e-9 ? std::fabs(dot(way, away)) / distance : norm(way);
-          if (own.way <= least) continue;
+          if (own.way <= least || own.way <= distance) continue;
           own.vertex = v;
           own.item = in.item(e);
           sum += own;

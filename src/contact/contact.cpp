@@ -257,7 +257,7 @@ void Contact::look(double time, double dt) {
   make_lists(refuse_runaways(time, dt), dt);
   find(now_);
   mend_crossings(time, dt);
-  refuse_fast_approach(time, dt);
+  refuse_fast_passage(time, dt);
   note_gaps();
 }
 

@@ -95,7 +95,7 @@ class Contact {
   std::string place_text(int vertex) const;
   std::string pair_text(int vertex, int item) const;
   double refuse_runaways(double time_us, double dt);
-  void refuse_fast_approach(double time_us, double dt);
+  void refuse_fast_passage(double time_us, double dt);
   void refuse(const LongestWay& found, double most, const std::function<std::string()>& text) const;
 
   ContactSettings settings_;

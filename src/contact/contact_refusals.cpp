@@ -42,14 +42,15 @@ double Contact::refuse_runaways(double time, double dt) {
   return all.whole;
 }
 
-/// What comes from beyond the range, or leaves for there, in one step may have gone through where contact had no part in it.
+/// What goes through a triangle in one step, and further than the range, does so where contact has no part in it, and may end beyond
+/// what signed gaps can see.
 /// @throws ComputationError
-void Contact::refuse_fast_approach(double time, double dt) {
+void Contact::refuse_fast_passage(double time, double dt) {
   const double most = settings_.range_um;
-  const LongestWay found = longest_approach(surface_, images_, lists_, own_, dt, most);
+  const LongestWay found = longest_passage(surface_, images_, lists_, own_, dt, most);
   refuse(found, most, [&] {
-    return fmt::format("contact: {} and {:.6g} us, approach or part by {:.3g} um in a step of {:.3g} us, more than contact.range_um = {:g}: "
-                       "they could cross unseen. Likely cause: a step too long for the flow or the load, or a membrane that blows up: "
+    return fmt::format("contact: {} and {:.6g} us, go through each other, by {:.3g} um in a step of {:.3g} us, more than contact.range_um = {:g}: "
+                       "contact has no part in it. Likely cause: a step too long for the flow or the load, or a membrane that blows up: "
                        "reduce time.step_us or the load",
                        pair_text(found.vertex, found.item), time, found.way, dt, most);
   });

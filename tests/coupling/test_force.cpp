@@ -181,8 +181,9 @@ TEST_CASE("a capsule five times as viscous inside deforms as by a boundary integ
   while (!simulation.done()) simulation.step();
   const auto shape = deformation(body_mesh(*simulation.surfaces(), 0));
   if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("D {:.4f}, {:.2f} degrees", shape.taylor, shape.angle_deg));
-  // 2.2 % more in this box, measured in one of ten radii beside.
-  CHECK(shape.taylor == Approx(0.0891).epsilon(0.03));
+  // 2.2 % more in this box, measured in one of ten radii beside; some 4 % more at five spacings a radius, which fall with the spacing:
+  // velocities have a kink where the viscosity steps, and the kernel takes in more of the thinner fluid's.
+  CHECK(shape.taylor == Approx(0.0891).epsilon(0.06));
   CHECK(shape.angle_deg == Approx(38.1).margin(1.5));
 }
 
