@@ -371,6 +371,6 @@ TEST_CASE("a vertex beyond a wall is named", "[transfer][ranks]") {
   const Comm comm;
   Grid grid(comm, sheared_box({8, 8, 8}), {false, false, false});
   Transfer transfer(grid, sides(walls), Kernel::three_point, 3);
-  const auto x = points(3, [](int i) { return i == 1 ? Triple{1.2, -0.1, 1} : Triple{1.2, 1, 1}; });
-  CHECK(comm.max(transfer.place(x)) == 1);  // on the rank whose wall it is
+  const auto x = points(3, [](int i) { return i == 1 ? Triple{1.2, -0.08, 1} : Triple{1.2, 1, 1}; });
+  CHECK(comm.max(transfer.place(x)) == 1);  // on the rank whose wall it is, since it is less than a cell beyond
 }
