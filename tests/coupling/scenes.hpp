@@ -112,6 +112,21 @@ class SharedFile {
   std::filesystem::path path_;
 };
 
+/// Calls work(comm) on the first ranks, among themselves. Every rank calls.
+template <class Work>
+void on_first_ranks(int count, const Work& work) {
+#ifdef CORPUSCLE_MPI
+  const bool here = Comm().rank() < count;
+  MPI_Comm handle;
+  MPI_Comm_split(MPI_COMM_WORLD, here ? 0 : 1, Comm().rank(), &handle);
+  if (here) work(Comm(handle));
+  MPI_Comm_free(&handle);
+  Comm().barrier();
+#else
+  work(Comm());
+#endif
+}
+
 /// Positions of every cell's vertices, moved on by the periods that it has been moved back, on every rank.
 inline std::vector<double> positions(FlowSimulation& simulation) {
   const SharedCells& cells = *simulation.shared_cells();

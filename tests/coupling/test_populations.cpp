@@ -157,4 +157,32 @@ TEST_CASE("a restart does not pack again", "[coupling][populations][ranks]") {
   FlowSimulation moved(Comm(), scene, timers, &packed);
   CHECK(largest_difference(positions(moved), positions(first), {0, 0, -0.01}) < 1e-12);
 }
+
+TEST_CASE("cells that packing has grown go on from a checkpoint on any number of ranks", "[coupling][populations][ranks]") {
+  Case scene = squeezed(50);
+  for (auto& tolerance : {&scene.fluid->momentum_tolerance, &scene.fluid->divergence_tolerance}) *tolerance = 1e-12;
+  const SharedFile file("grown");
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  CHECK(simulation.coupling()->packed()->size < 0.95);
+  while (simulation.steps() < 5) simulation.step();
+  write_checkpoint(file.path(), simulation, {"", "", "", ""});
+  const Outcome whole = finish(simulation);
+  for (int readers : {1, 2, 4}) {
+    if (readers > Comm().size()) continue;
+    INFO("written by " << Comm().size() << " ranks, read by " << readers);
+    on_first_ranks(readers, [&](const Comm& comm) {
+      PackedCells packed = read_packed_cells(file.path(), comm, scene, "");
+      FlowSimulation next(comm, scene, timers, &packed);
+      read_checkpoint(file.path(), next, "", "");
+      const Outcome end = finish(next);
+      CHECK(end.cells == 1);
+      if (!comm.root()) return;
+      const double difference = largest_difference(whole.x, end.x);
+      if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{} to {} ranks: {:.2e} um", Comm().size(), readers, difference));
+      CHECK(difference <= (readers == Comm().size() ? 0 : 1e-8));
+    });
+  }
+}
+
 #endif
