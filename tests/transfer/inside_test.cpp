@@ -254,6 +254,29 @@ TEST_CASE("each cell has the viscosity of its own kind, and a surface that is no
 }
 
 #ifdef CORPUSCLE_MPI
+TEST_CASE("a surface that is not closed is noticed on all ranks, where lines go through several of them",
+          "[transfer][inside][ranks]") {
+  const auto mesh = ellipsoid_mesh({1.5, 1.4, 1.3}, {0.1, -0.1, 0.05}, 0.3);
+  Inside s(Comm(), cube_of(16, 4), all(Type::wall), {mesh});
+  s.update();
+  CHECK_FALSE(s.cytosol.broken());
+  // A vertex that is nowhere takes its triangles with it: a hole wider than a spacing, at both ends of each direction in turn.
+  const auto rest = Kokkos::create_mirror(s.surfaces.x);
+  Kokkos::deep_copy(rest, s.surfaces.x);
+  for (int d = 0; d < 3; ++d)
+    for (const int end : {-1, 1}) {
+      const auto position = Kokkos::create_mirror(s.surfaces.x);
+      Kokkos::deep_copy(position, rest);
+      int farthest = 0;
+      for (int v = 0; v < s.surfaces.vertices; ++v)
+        if (end * rest(v, d) > end * rest(farthest, d)) farthest = v;
+      position(farthest, 0) = 1e3;
+      Kokkos::deep_copy(s.surfaces.x, position);
+      s.update();
+      CHECK(s.cytosol.broken());
+    }
+}
+
 TEST_CASE("what is inside is the same to the bit on any ranks", "[transfer][inside][ranks]") {
   if (Comm().size() == 1) return;
   const Type type = GENERATE(Type::periodic, Type::wall);
