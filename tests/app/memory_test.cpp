@@ -154,6 +154,10 @@ TEST_CASE("counts beyond 32 bits are refused with the figure") {
   REQUIRE_THROWS_WITH(corpuscle::require_countable(many, 1), Contains("triangles under 27 periodic images"));
   many.shared = true, many.own = 4e7, many.copies = 4e6;  // whatever others have
   REQUIRE_NOTHROW(corpuscle::require_countable(many, 1));
+  many.vertices = 2.2e9;
+  REQUIRE_NOTHROW(corpuscle::require_countable(many, 1));
+  many.writes_cells = true;
+  REQUIRE_THROWS_WITH(corpuscle::require_countable(many, 1), Contains("output.cells: 2.2e+09 vertices"));
   many.own = 4e8;
   REQUIRE_THROWS_WITH(corpuscle::require_countable(many, 1), Contains("cells: the corners of triangles") && Contains("more ranks"));
 }

@@ -70,6 +70,31 @@ Case box_with_sphere(int cells) {
 
 }  // namespace
 
+TEST_CASE("at rest there is no energy to balance, and no imbalance of rounding over rounding", "[coupling][energy]") {
+  Case scene = scenes::aslant_flow(4, 45);
+  scene.fluid->pressure_gradient_Pa_per_um = {};
+  scene.boundaries[3].type = BoundarySettings::Type::wall;
+  scene.boundaries[3].velocity.reset();
+  CellSettings cell;
+  cell.shape = CellSettings::Shape::sphere;
+  cell.radius_um = 1.1;
+  cell.vertices = 120;
+  cell.law = CellSettings::Law::neo_hookean;
+  cell.center_um = {2.03, 2.01, 1.98};
+  scene.cells = {cell};
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  EnergyBalance balance(simulation);
+  while (true) {
+    balance.sample(simulation.membranes()->diagnostics()[0].energy_fJ());
+    if (simulation.done()) break;
+    simulation.step();
+  }
+  INFO(balance.largest_fJ());
+  CHECK_FALSE(balance.imbalance().has_value());
+  CHECK_FALSE(balance.coupling_imbalance().has_value());
+}
+
 TEST_CASE("the energy of a tube's flow balances, with convection and without", "[coupling][energy]") {
   for (const auto convection : {FluidSettings::Convection::none, FluidSettings::Convection::extrapolated}) {
     const Outcome coarse = run(tube(11, 17, convection)), fine = run(tube(21, 33, convection));

@@ -132,6 +132,21 @@ TEST_CASE("a cell that has no room at rest grows to its size as a membrane", "[c
   CHECK_THROWS_WITH(FlowSimulation(Comm::alone(), bare, timers), Catch::Contains("with [contact] they would bend"));
 }
 
+TEST_CASE("the gap of packed cells is not asked of the scene's own", "[coupling][populations]") {
+  Case scene = crowd(15);
+  scene.populations.resize(1);
+  scene.populations[0].hematocrit = 0;
+  scene.populations[0].count = 3;
+  scene.populations[0].gap_um = 0.1;
+  for (int n = 0; n < 2; ++n) {
+    scene.cells.push_back(scene.cell_types[0].cell);
+    scene.cells[n].center_um = {1.5 + 1.64 * n, 2, 1.5};
+  }
+  Timers timers;
+  FlowSimulation simulation(Comm::alone(), scene, timers);
+  CHECK(simulation.coupling()->packing()->smallest_gap_um >= 0.1);  // of the own two: 0.04
+}
+
 #ifdef CORPUSCLE_HDF5
 TEST_CASE("a restart does not pack again", "[coupling][populations][ranks]") {
   const bool tight = GENERATE(false, true);
@@ -150,6 +165,12 @@ TEST_CASE("a restart does not pack again", "[coupling][populations][ranks]") {
   FlowSimulation next(Comm(), scene, timers, &packed);
   read_checkpoint(file.path(), next, "", "");
   CHECK(largest_difference(finish(next).x, whole.x) == 0);
+  if (tight) {  // stiffer membranes need shorter steps, also of cells that are small until the checkpoint is read
+    Case stiff = scene;
+    stiff.cell_types[0].cell.shear_modulus_uN_per_m *= 300;
+    FlowSimulation refused(Comm(), stiff, timers, &packed);
+    CHECK_THROWS_WITH(read_checkpoint(file.path(), refused, "", ""), Catch::Contains("time.step_us"));
+  }
   // The cells are those that it was given.
   for (CellPlace& cell : packed.cells) cell.center_um[2] += 0.01;
   FlowSimulation first(Comm(), scene, timers, &packed);

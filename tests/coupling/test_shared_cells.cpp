@@ -89,6 +89,51 @@ Outcome run(const Comm& comm, const Case& scene) {
 
 }  // namespace
 
+TEST_CASE("that a mesh is too coarse for the grid is told once for its type, the same on all ranks", "[coupling][cells][ranks]") {
+  Case scene = carried_capsules(15);
+  scene.cells.resize(4);
+  for (CellSettings& cell : scene.cells) cell.radius_um = 0.8, cell.vertices = 60, cell.shear_modulus_uN_per_m = 0.5;
+  const auto told = [&] {
+    Timers timers;
+    FlowSimulation simulation(Comm(), scene, timers);
+    return simulation.coupling()->coarse();
+  };
+  CHECK(told().find("its mesh is too coarse") == std::string::npos);  // edges of 0.8 spacings
+  for (CellSettings& cell : scene.cells) cell.radius_um = 1.6, cell.vertices = 42;
+  for (int n = 0; n < 4; ++n) scene.cells[n].center_um = {2.1 + 4 * (n % 2), 2, 2.1 + 4.0 * (n / 2)};
+  const std::string text = told();
+  INFO(text);
+  const auto first = text.find("its mesh is too coarse for the grid: edges are");
+  CHECK(first != std::string::npos);
+  CHECK(text.find("vertices = ") != std::string::npos);
+  CHECK(text.find("its mesh is too coarse", first + 1) == std::string::npos);
+  std::string of_root = text;
+  Comm().broadcast(of_root);
+  CHECK(text == of_root);
+}
+
+#ifdef CORPUSCLE_HDF5
+TEST_CASE("membrane viscosity may come and go at restarts", "[coupling][cells][ranks]") {
+  const bool before = GENERATE(false, true);
+  const auto scene_with = [](bool viscous) {
+    Case scene = carried_capsules(60);
+    for (CellSettings& cell : scene.cells) cell.membrane_viscosity_N_s_per_m = viscous ? 1e-8 : 0;
+    return scene;
+  };
+  const SharedFile file("viscosity");
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene_with(before), timers);
+  for (int n = 0; n < 2; ++n) simulation.step();
+  write_checkpoint(file.path(), simulation, {"", "", "", ""});
+  FlowSimulation next(Comm(), scene_with(!before), timers);
+  read_checkpoint(file.path(), next, "", "");
+  CHECK(largest_difference(positions(next), positions(simulation)) == 0);
+  next.step();
+  CHECK(largest_difference(positions(next), positions(simulation)) < 0.5);
+  CHECK(largest_difference(positions(next), positions(simulation)) > 0);
+}
+#endif
+
 TEST_CASE("cells cross ranks and periodic sides, and nothing shows that they do", "[coupling][cells][ranks]") {
   using Pressure = CouplingSettings::Pressure;
   const auto [viscous, pressure] =

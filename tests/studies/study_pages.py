@@ -27,7 +27,7 @@ STUDIES = {
     "pack": ("pack.md", [(["--minutes", "0"], ["# Dense packs in shear", "| 1000 |", ALL, "5.38 (at 124 /s)"]),
                          (["--quick", "--slip", "false", "--minutes", "0.03"], ["# Dense packs in shear", ALL])]),
     "two_cells": ("two_cells.md", [(["--minutes", "0"], ["# Two red cells", "| 0.5 | 0.33 | 1000 | 20 |", ALL]),
-                                   (["--quick", "--minutes", "0.03"], ["# Two red cells", ALL])]),
+                                   (["--quick", "--minutes", "0.01"], ["# Two red cells", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
                                            (["--minutes", "0.03"], ["# The tube on", "2 ranks", ALL])]),
     "blood_tubes": ("blood_tubes.md", [(["--quick", "--minutes", "0"], ["# Blood in tubes", ALL]),
