@@ -23,6 +23,12 @@ struct ThreePointDelta {
     const double under = 1 - 3 * (1 - a) * (1 - a);
     return (5 - 3 * a - std::sqrt(under > 0 ? under : 0)) / 6;
   }
+  /// How the value of the integer numbered p from the first on changes with the point; `w` are the values of all.
+  template <class Values>
+  KOKKOS_INLINE_FUNCTION static double slope(const Values& w, int p) {
+    const double r = w(2) - w(0), bend = r / (3 * w(1) - 1);  // 3 w(1) = 1 + sqrt(1 - 3 r^2)
+    return p == 1 ? -bend : 0.5 * (bend + (p - 1));
+  }
 };
 
 /// Peskin, Acta Numerica 11, 2002.
@@ -37,6 +43,11 @@ struct FourPointDelta {
     if (a <= 1) return (3 - 2 * a + std::sqrt(1 + 4 * a - 4 * a * a)) / 8;
     const double under = -7 + 12 * a - 4 * a * a;
     return (5 - 2 * a - std::sqrt(under > 0 ? under : 0)) / 8;
+  }
+  template <class Values>
+  KOKKOS_INLINE_FUNCTION static double slope(const Values& w, int p) {
+    const double r = 2 * (w(2) - w(1)) + 0.5, bend = (2 - 4 * r) / (4 * (w(1) - w(0)));  // 4 (w(1) - w(0)) = sqrt(1 + 4 r - 4 r^2)
+    return 0.125 * ((p < 2 ? -2 : 2) + (p == 1 || p == 2 ? bend : -bend));
   }
 };
 

@@ -8,7 +8,7 @@
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 210 bytes.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 210 bytes, 282 with dipoles.
 struct MarkerViews {
   int count = 0;
   Array<int> vertex;            // [marker] where it comes from
@@ -17,6 +17,7 @@ struct MarkerViews {
   Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
   Table<double> weight;         // [marker, 6 points] of those lines of points
   Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
+  Table<double> dipole;         // [marker, 9] the same of its changes, 3 d + e along e (kink.hpp); without values there are none
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers
   Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces

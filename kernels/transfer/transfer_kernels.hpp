@@ -74,6 +74,27 @@ KOKKOS_INLINE_FUNCTION bool is_folded(const TransferBlock& block, const double (
   return folded;
 }
 
+/// Calls visit(i, j, k, weight, how it changes along each direction of the grid) for the faces of direction d of a marker that is not folded.
+template <class Delta, class Visit>
+KOKKOS_INLINE_FUNCTION void visit_sloped(const MarkerViews& m, int marker, int d, const Visit& visit) {
+  constexpr int points = Delta::points;
+  double weight[3][points], slope[3][points];
+  int base[3];
+  for (int e = 0; e < 3; ++e) {
+    const int line = e == d ? 3 + e : e;
+    base[e] = m.base(marker, line);
+    for (int p = 0; p < points; ++p) weight[e][p] = m.weight(marker, line * points + p);
+    for (int p = 0; p < points; ++p) slope[e][p] = Delta::slope([&](int q) { return weight[e][q]; }, p);
+  }
+  for (int k = 0; k < points; ++k)
+    for (int j = 0; j < points; ++j)
+      for (int i = 0; i < points; ++i) {
+        const double changes[3] = {slope[0][i] * weight[1][j] * weight[2][k], weight[0][i] * slope[1][j] * weight[2][k],
+                                   weight[0][i] * weight[1][j] * slope[2][k]};
+        visit(base[0] + i, base[1] + j, base[2] + k, weight[0][i] * weight[1][j] * weight[2][k], changes);
+      }
+}
+
 /// The same as seen_areas() of its place, with the weights that it has.
 template <class Delta>
 KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const MarkerViews& m, int marker, const double (&eta)[3]) {
@@ -159,8 +180,28 @@ void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) 
       });
 }
 
-/// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
+/// What a marker's dipoles add to the forces across the faces of a cell that it reaches with the weights w.
 template <class Delta>
+KOKKOS_INLINE_FUNCTION void add_dipoles(const MarkerViews& m, int marker, const int (&at)[3], const double (&w)[6], double (&sum)[3]) {
+  constexpr int points = Delta::points;
+  bool any = false;  // the weights of those that are folded back have no slopes
+  for (int n = 0; n < 9; ++n) any = any || m.dipole(marker, n) != 0;
+  if (!any) return;
+  double change[6];
+  for (int e = 0; e < 6; ++e)
+    change[e] = w[e] == 0 ? 0 : Delta::slope([&](int p) { return m.weight(marker, e * points + p); }, at[e % 3] - m.base(marker, e));
+  for (int d = 0; d < 3; ++d) {
+    int line[3];
+    for (int e = 0; e < 3; ++e) line[e] = e == d ? 3 + e : e;
+    sum[d] += change[line[0]] * w[line[1]] * w[line[2]] * m.dipole(marker, 3 * d) +
+              w[line[0]] * change[line[1]] * w[line[2]] * m.dipole(marker, 3 * d + 1) +
+              w[line[0]] * w[line[1]] * change[line[2]] * m.dipole(marker, 3 * d + 2);
+  }
+}
+
+/// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
+/// @tparam dipoles  of markers with them
+template <class Delta, bool dipoles>
 void spread_forces(const TransferBlock& block, const MarkerViews& markers, const FaceForce& force) {
   const MarkerViews m = markers;
   const IndexSpace index = block.index();
@@ -190,6 +231,7 @@ void spread_forces(const TransferBlock& block, const MarkerViews& markers, const
               sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
               sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
               sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
+              if constexpr (dipoles) add_dipoles<Delta>(m, marker, at, w, sum);
             }
           }
         for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];

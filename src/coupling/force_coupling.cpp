@@ -66,6 +66,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   if (std::any_of(ratios.begin(), ratios.end(), [](double ratio) { return ratio != 1; })) {
     cytosol_ = std::make_unique<Cytosol>(fluid.grid(), ratios);
     fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least(), cytosol_->fluidity());
+    if (scene.coupling->slip) transfer_->slip_between(ratios);
   }
   fluid.raise_reference_speed(quiet_speed_);
   take_up();
@@ -267,7 +268,7 @@ void ForceCoupling::measure_stability() {
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * spacing;
-  model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * spacing : 0;
+  model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * transfer_->largest_slip() * spacing : 0;
   // Of each type the same cell on any number of ranks: what slip is held to goes by this.
   std::vector<int> numbers = membranes_->first_of_types();
   for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));
@@ -366,10 +367,12 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     }
     cells_->to_copies(forces());
     if (scene_.coupling->slip) limit_slip(dt);
+    const SlipViews slip = slip_of_membranes();
+    const SlipViews* const used = scene_.coupling->slip ? &slip : nullptr;
     if (sharp_pressure())
-      transfer_->spread(forces(), surfaces());
+      transfer_->spread(forces(), surfaces(), used);
     else
-      transfer_->spread(forces());
+      transfer_->spread(forces(), used);
   }
   fluid_.solve(time + dt, nullptr);
   {
@@ -444,7 +447,8 @@ void ForceCoupling::resume(double time) {
 }
 
 SlipViews ForceCoupling::slip_of_membranes() const {
-  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), loads_ ? loads_->gaps() : Array<double>(), followed_);
+  const Array<int> type = cytosol_ ? membranes_->views().type : Array<int>();
+  return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), type, loads_ ? loads_->gaps() : Array<double>(), followed_);
 }
 
 double ForceCoupling::unresolved_dissipation() {

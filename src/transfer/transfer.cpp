@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "transfer/delta.hpp"
+#include "transfer/kink.hpp"
 #include "transfer/marker_bins.hpp"
 #include "transfer/pressure_jump.hpp"
 #include "transfer/sharpen.hpp"
@@ -124,9 +125,11 @@ void Transfer::weigh() {
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
   const auto rows = static_cast<std::size_t>(markers_.count);
-  double* memory = workspace_->reserve((6 * points + 3) * rows);
+  const std::size_t dipoles = ratios_.empty() ? 0 : 9;
+  double* memory = workspace_->reserve((6 * points + 3 + dipoles) * rows);
   markers_.weight = Table<double>(memory, rows, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
+  markers_.dipole = Table<double>(memory + (6 * points + 3) * rows, dipoles > 0 ? rows : 0, dipoles);
   with_kernel([&](auto delta) {
     prepare_markers<decltype(delta)>(block_, markers_);
     mark_near<decltype(delta)>(block_, markers_);
@@ -167,9 +170,9 @@ void Transfer::prepare_sharpening() {
   for (int d = 0; d < 3; ++d) block_.sharp_area[d] = sharp[d];
 }
 
-void Transfer::spread(const Components<double>& force) { spread_rest(force, nullptr); }
+void Transfer::spread(const Components<double>& force, const SlipViews* slip) { spread_rest(force, nullptr, slip); }
 
-void Transfer::spread(const Components<double>& force, const SurfaceSet& surface) {
+void Transfer::spread(const Components<double>& force, const SurfaceSet& surface, const SlipViews* slip) {
   const std::size_t vertices = surface.vertices;
   if (jump_->rest.extent(0) < vertices) {
     const std::size_t room = vertices + vertices / 16 + 1;
@@ -181,17 +184,22 @@ void Transfer::spread(const Components<double>& force, const SurfaceSet& surface
   smooth_loads(surface, jump_->jump, once);
   smooth_loads(surface, once, jump_->jump);
   rest_of_loads(surface, force, jump_->jump, jump_->rest);
-  spread_rest(jump_->rest, &surface);
+  spread_rest(jump_->rest, &surface, slip);
 }
 
 /// @param surface  null where there is no more to them
-void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* surface) {
+void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* surface, const SlipViews* slip) {
   weigh();
   const bool sharp = moment_ > 0;
   const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
   with_kernel([&](auto delta) {
-    resolve_forces<decltype(delta)>(block_, markers_, force);
-    spread_forces<decltype(delta)>(block_, markers_, spread);
+    if (slip && !ratios_.empty()) {
+      resolve_kinked_forces<decltype(delta)>(block_, *slip, markers_, force);
+      spread_forces<decltype(delta), true>(block_, markers_, spread);
+    } else {
+      resolve_forces<decltype(delta)>(block_, markers_, force);
+      spread_forces<decltype(delta), false>(block_, markers_, spread);
+    }
   });
   for (int d = 0; d < 3 && sharp; ++d) {
     grid_->halo().exchange(raw_[d]);
@@ -230,7 +238,10 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
     grid_->halo().exchange(raw_[d]);
     sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
   }
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity); });
+  with_kernel([&](auto delta) {
+    interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity);
+    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, sharp ? sharp_flux_ : flux, markers_, velocity);
+  });
   if (slip) add_slip(block_, *slip, markers_, velocity);
 }
 
@@ -249,11 +260,32 @@ double Transfer::power_on_sides(const Components<double>& force, const Component
   return power_of(places_.vertices, force, room);
 }
 
-SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity,
-                         const Array<double>& gap, const Components<double>& followed) const {
+void Transfer::slip_between(const std::vector<double>& ratios) {
+  ratios_ = ratios;
+  ratio_ = make<Array<double>>("slip_ratio", ratios.size());
+  const auto host = Kokkos::create_mirror_view(ratio_);
+  std::copy(ratios.begin(), ratios.end(), host.data());
+  Kokkos::deep_copy(ratio_, host);
+  weighed_ = false;
+}
+
+SlipLaw Transfer::law_of_slip() const {
   SlipLaw law{};
   with_kernel([&](auto delta) { law = slip_law<decltype(delta)>(); });
-  return {law, viscosity, force, surface.normal, surface.area, gap, followed};
+  return law;
+}
+
+SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<int>& type,
+                         const Array<double>& gap, const Components<double>& followed) const {
+  const Array<double> ratio = type.extent(0) > 0 ? ratio_ : Array<double>();
+  return {law_of_slip(), viscosity, force, surface.normal, surface.area, gap, followed, surface.vertex_body, type, ratio};
+}
+
+double Transfer::largest_slip() const {
+  const SlipLaw law = law_of_slip();
+  double most = ratios_.empty() ? 1 : 0;
+  for (double ratio : ratios_) most = std::max(most, corpuscle::slip_between(law, ratio));
+  return most;
 }
 
 double Transfer::marker_radius() const {

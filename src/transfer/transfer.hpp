@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/workspace.hpp"
 #include "fluid/masked_gradient.hpp"
@@ -28,11 +29,14 @@ class Transfer {
   ///          unless another part of it, which may be near where it bends, has the vertex at home
   int place(const Components<double>& x);
   /// The forces [vertex, 3], nN, onto faces().
-  void spread(const Components<double>& force);
+  /// @param slip  as for interpolate(): what takes kinks off where there are two fluids; null for none
+  void spread(const Components<double>& force, const SlipViews* slip = nullptr);
   /// The same with what is normal to the surface that they act on as a jump of the pressure across it. After sharpen_pressure().
-  void spread(const Components<double>& force, const SurfaceSet& surface);
+  void spread(const Components<double>& force, const SurfaceSet& surface, const SlipViews* slip = nullptr);
   /// From now on there is memory for that.
   void sharpen_pressure();
+  /// Membranes of those types [type] have fluids so many times as viscous inside as outside: their slip is another from now on.
+  void slip_between(const std::vector<double>& ratios);
   /// Whether triangles reach farther than this rank's block knows of vertices: then some jumps would be missing. After place().
   bool reach_too_far(const SurfaceSet& surface) const;
   /// The force on faces, with valid halos: shared with the fluid.
@@ -46,10 +50,13 @@ class Transfer {
   /// rank's part, nW. Finds all weights anew: for reports. @param room  [vertex, 3], written over
   double power_on_sides(const Components<double>& force, const Components<double>& u, const Components<double>& room);
   /// What the slip of a membrane depends on, with this kernel's law.
+  /// @param type  [body] as for slip_between(); without values there is but one fluid
   /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
   /// @param followed  [vertex, 1] share of the force that the slip follows; without values all of it
-  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<double>& gap = {},
-                 const Components<double>& followed = {}) const;
+  SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<int>& type = {},
+                 const Array<double>& gap = {}, const Components<double>& followed = {}) const;
+  /// Of the slip in one fluid, the largest share that those of slip_between() leave.
+  double largest_slip() const;
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
@@ -66,9 +73,10 @@ class Transfer {
   const VertexPlaces& places() const { return places_; }
 
  private:
+  SlipLaw law_of_slip() const;
   void prepare_sharpening();
   void add_pressure_jumps(const SurfaceSet& surface);
-  void spread_rest(const Components<double>& force, const SurfaceSet* surface);
+  void spread_rest(const Components<double>& force, const SurfaceSet* surface, const SlipViews* slip);
   void make_places(int vertices);
   void make_room(int markers);
   void weigh();
@@ -87,6 +95,8 @@ class Transfer {
   bool weighed_ = false;  // the markers have their weights, in the workspace
   double largest_spacing_ = 0;
   FaceForce faces_;
+  std::vector<double> ratios_;            // of slip_between()
+  Array<double> ratio_;                   // the same for kernels
   double moment_ = 0;                     // that sharpen_faces() takes back; 0: nothing
   Array<double> raw_[3], sharp_flux_[3];  // [cell] at faces, before and after; only then
   /// Of a pressure that jumps.

@@ -1,0 +1,233 @@
+// Where one fluid is outside a membrane and another inside: what is taken off the velocity's kink, and of forces.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "cells/rank_blocks.hpp"
+#include "fields.hpp"
+
+using namespace corpuscle;
+using namespace corpuscle::transfer_test;
+
+namespace {
+
+/// So viscous that a slip would drive the membrane: there is none, and what is left is the kink.
+constexpr double ratio = 50;
+
+/// Points with a normal, of one type.
+struct Points {
+  Points(const Components<double>& x, const Components<double>& force_of, const std::function<Triple(int)>& normal)
+      : force(force_of), type("corpuscle::test::type", 1) {
+    const auto count = static_cast<int>(x.extent(0));
+    set.vertices = count, set.bodies = set.cells = 1;
+    set.x = x;
+    set.normal = points(count, [&](int i) {
+      const Triple n = normal(i);
+      const double size = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+      return Triple{n[0] / size, n[1] / size, n[2] / size};
+    });
+    set.area = Array<double>("corpuscle::test::area", count);
+    set.vertex_body = Array<int>("corpuscle::test::body", count);
+    Kokkos::deep_copy(set.area, 0.01);
+  }
+  SlipViews slip(const Transfer& transfer) const { return transfer.slip(set, force, 1, type); }
+
+  SurfaceSet set;
+  Components<double> force;
+  Array<int> type;
+};
+
+Points random_points(int count, double edge, bool warped) {
+  Noise noise;
+  const auto any = [&](int) { return Triple{noise(-1, 1), noise(-1, 1), noise(-1, 1)}; };
+  const auto force = points(count, any);
+  return Points(inside(count, edge, warped), force, any);
+}
+
+Components<double> velocity_of(Transfer& transfer, const Field& field, const Points& p, bool with) {
+  Components<double> v("corpuscle::test::v", p.set.vertices, 3);
+  const SlipViews slip = p.slip(transfer);
+  transfer.interpolate(field.flux, field.u, with ? &slip : nullptr, v);
+  return v;
+}
+
+}  // namespace
+
+TEST_CASE("forces go the way back that velocities lose their kink", "[transfer][ranks]") {
+  // On a grid without two parallel faces, up to its walls: as without the kink, to round-off.
+  const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
+  const Comm comm;
+  Grid grid(comm, warped_box({12, 11, 13}), {false, false, false});
+  const Points p = random_points(300, 0.02, true);
+  Transfer transfer(grid, sides(walls), kernel, p.set.vertices);
+  transfer.slip_between({ratio});
+  REQUIRE(transfer.place(p.set.x) == -1);
+  const SlipViews slip = p.slip(transfer);
+  transfer.spread(p.force, &slip);
+  Field field = make_field(grid, rough);
+  Kokkos::deep_copy(field.u, 0.0);
+  const auto f = on_host(p.force);
+  const auto power = [&](bool with) {
+    const auto u = sum_of_ranks(velocity_of(transfer, field, p, with));
+    double sum = 0;
+    for (int i = 0; i < p.set.vertices; ++i)
+      for (int m = 0; m < 3; ++m) sum += f(i, m) * u(i, m);
+    return sum;
+  };
+  std::vector<decltype(on_host(field.flux[0]))> flux;
+  for (int d = 0; d < 3; ++d) flux.push_back(on_host(field.flux[d]));
+  const double at_faces = face_sum(transfer, [&](int d, int c) { return flux[d](c); });
+  CHECK(at_faces == Approx(power(true)).epsilon(1e-11));
+  CHECK(std::abs(power(true) - power(false)) > 0.01 * std::abs(power(false)));
+  for (int m = 0; m < 3; ++m) {  // and the forces' sum is left as it is
+    std::vector<decltype(on_host(grid.views().x))> area;
+    for (int d = 0; d < 3; ++d) area.push_back(on_host(transfer.block().sharp_area[d]));
+    const double with = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
+    transfer.spread(p.force);
+    const double without = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
+    transfer.spread(p.force, &slip);
+    CHECK(with == Approx(without).margin(kernel == Kernel::three_point ? 0.05 : 0.02));
+  }
+}
+
+TEST_CASE("of a velocity only what shears along a membrane between two fluids is taken off", "[transfer][ranks]") {
+  const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
+  const Comm comm;
+  const auto change = [&](bool curved, const std::function<Triple(const Triple&)>& velocity, const std::function<Vec3(const Vec3&)>& expected) {
+    Grid grid(comm, curved ? warped_box({12, 12, 12}) : sheared_box({12, 12, 12}), {false, false, false});
+    const Points p = random_points(200, 0.3, curved);
+    Transfer transfer(grid, sides(walls), kernel, p.set.vertices);
+    transfer.slip_between({ratio});
+    REQUIRE(transfer.place(p.set.x) == -1);
+    const Field field = make_field(grid, velocity);
+    const auto with = sum_of_ranks(velocity_of(transfer, field, p, true)), without = sum_of_ranks(velocity_of(transfer, field, p, false));
+    const auto normal = on_host(p.set.normal);
+    double worst = 0;
+    for (int i = 0; i < p.set.vertices; ++i) worst = std::max(worst, norm(load(with, i) - load(without, i) - expected(load(normal, i))));
+    return worst;
+  };
+  const auto nothing = [](const Vec3&) { return Vec3{}; };
+  const double round_off = comm.size() > 1 && kernel == Kernel::four_point ? 3e-5 : 1e-11;  // of areas beyond halos
+  CHECK(change(true, [](const Triple&) { return Triple{0.3, -1, 0.7}; }, nothing) < round_off);
+  CHECK(change(false, [](const Triple& p) { return Triple{p[1] - 2 * p[2], 3 * p[2] - p[0], 2 * p[0] - 3 * p[1]}; }, nothing) < round_off);
+  // u = (y, 0, 0): grad u + grad u^T = e_x e_y + e_y e_x; spacings g of the sheared box, of 2 um and 12 cells.
+  const double share = (kernel == Kernel::three_point ? 0.237 : 0.358) * 2 * (ratio - 1) / (ratio + 1) / 6;
+  const auto shear = [&](const Vec3& n) {
+    const Vec3 g[3] = {{1, 0, 0.15}, {0.3, 1, 0}, {0, 0.2, 1}};
+    double square = 0;
+    for (const Vec3& direction : g) square += dot(direction, n) * dot(direction, n);
+    const Vec3 twice = {n.y, n.x, 0};
+    return (-share * std::sqrt(square)) * (twice - dot(twice, n) * n);
+  };
+  CHECK(change(false, [](const Triple& p) { return Triple{p[1], 0, 0}; }, shear) < 1e-10);
+}
+
+TEST_CASE("how the grid is cut over ranks does not change what kinks are", "[transfer][ranks]") {
+  const Comm comm;
+  if (comm.size() == 1) return;
+  const NodeSource nodes = warped_box({9, 8, 10});
+  Grid cut(comm, nodes, {false, false, false}), whole(Comm::alone(), nodes, {false, false, false});
+  const Points p = random_points(600, 0.02, true);
+  Transfer of_ranks(cut, sides(walls), Kernel::three_point, p.set.vertices), of_one(whole, sides(walls), Kernel::three_point, p.set.vertices);
+  for (Transfer* transfer : {&of_ranks, &of_one}) {
+    transfer->slip_between({ratio});
+    REQUIRE(transfer->place(p.set.x) == -1);
+    const SlipViews slip = p.slip(*transfer);
+    transfer->spread(p.force, &slip);
+  }
+  double largest = 0, off = 0;
+  const IndexSpace& index = cut.index();
+  for (int d = 0; d < 3; ++d) {
+    const auto mine = on_host(of_ranks.faces().across[d]), all = on_host(of_one.faces().across[d]);
+    const CellBox box = face_box(index, d);
+    for (int k = box.lower[2]; k < box.upper[2]; ++k)
+      for (int j = box.lower[1]; j < box.upper[1]; ++j)
+        for (int i = box.lower[0]; i < box.upper[0]; ++i) {
+          const double exact = all(whole.index().cell(index.first[0] + i, index.first[1] + j, index.first[2] + k));
+          largest = std::max(largest, std::abs(exact));
+          off = std::max(off, std::abs(mine(index.cell(i, j, k)) - exact));
+        }
+  }
+  CHECK(off < 1e-12 * largest);
+  const auto u = sum_of_ranks(velocity_of(of_ranks, make_field(cut, rough), p, true));
+  const auto exact = on_host(velocity_of(of_one, make_field(whole, rough), p, true));
+  off = 0;
+  for (int i = 0; i < p.set.vertices; ++i)
+    for (int m = 0; m < 3; ++m) off = std::max(off, std::abs(u(i, m) - exact(i, m)));
+  CHECK(off < 1e-12);
+}
+
+namespace {
+
+/// A plane across y between walls, the fluid below it `r` times as viscous, where the upper wall moves with `wall` and the plane is
+/// pushed along x with `pull` per area, times viscosity over spacing: how much faster the plane is than it should be.
+double plane_error(double y, double r, double wall, double pull, bool with) {
+  constexpr int n = 4, high = 16, along = 2 * n, count = along * along;
+  auto boundaries = sides({Type::periodic, Type::periodic, Type::wall, Type::moving_wall, Type::periodic, Type::periodic});
+  boundaries[3].velocity = Triple{wall, 0, 0};
+  auto box_of = box({n, high, n}, {n, high, n});
+  Grid grid(Comm::alone(), make_node_source(box_of), {true, false, true});
+  FluidSettings settings;
+  settings.convection = FluidSettings::Convection::none;
+  settings.kinematic_viscosity_um2_per_us = 1;
+  settings.momentum_tolerance = settings.divergence_tolerance = 1e-10;
+  FluidSolver fluid(grid, settings, boundaries);
+  const Array<double> relative("corpuscle::test::relative", grid.index().size()), fluidity("corpuscle::test::fluidity", grid.index().size());
+  const auto at = on_host(grid.views().x);
+  const auto mu = Kokkos::create_mirror_view(relative), inverse = Kokkos::create_mirror_view(fluidity);
+  for (int c = 0; c < grid.index().size(); ++c) {
+    const double inside = std::clamp(y - at(c, 1) + 0.5, 0.0, 1.0), part = at(c, 1) <= 0 ? 1 : at(c, 1) >= high ? 0 : inside;
+    mu(c) = part * r + 1 - part, inverse(c) = part / r + 1 - part;
+  }
+  Kokkos::deep_copy(relative, mu), Kokkos::deep_copy(fluidity, inverse);
+  fluid.set_viscosity(relative, std::min(1.0, r), fluidity);
+  const auto shifts = period_shifts(grid);
+  const auto copies = static_cast<int>(shifts.size());
+  const auto x = points(count * copies, [&](int v) {
+    const Vec3 s = shifts[v / count];
+    return Triple{0.13 + 0.5 * (v % along) + s.x, y, 0.07 + 0.5 * (v % count / along) + s.z};
+  });
+  const Points p(x, points(count * copies, [&](int) { return Triple{0.25 * pull, 0, 0}; }), [](int) { return Triple{0, 1, 0}; });
+  Kokkos::deep_copy(p.set.area, 0.25);
+  Transfer transfer(grid, boundaries, Kernel::three_point, count * copies);
+  transfer.slip_between({r});
+  fluid.set_face_force(transfer.faces());
+  fluid.raise_reference_speed(1);
+  REQUIRE(transfer.place(x) == -1);
+  const SlipViews slip = p.slip(transfer);
+  transfer.spread(p.force, with ? &slip : nullptr);
+  for (int s = 0; s < 8; ++s) {
+    fluid.begin_step(1e4);
+    fluid.solve(1e4 * (s + 1), nullptr);
+  }
+  Components<double> velocity("corpuscle::test::velocity", count * copies, 3);
+  transfer.interpolate(fluid.flux(), fluid.velocity(), with ? &slip : nullptr, velocity);
+  const auto v = on_host(velocity);
+  double mean = 0;
+  for (int i = 0; i < count * copies; ++i) mean += v(i, 0) / count;
+  return mean - (wall / (high - y) + pull) / (1 / (high - y) + r / y);
+}
+
+/// The mean of it over where in a cell the plane is.
+double mean_error(double r, double wall, double pull, bool with) {
+  double sum = 0;
+  for (int n = 0; n < 5; ++n) sum += plane_error(8.1 + 0.2 * n, r, wall, pull, with) / 5;
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("a plane between two fluids moves as it should, sheared or pulled", "[transfer]") {
+  // Sheared at one per unit of time on the outside of an inner fluid as wide: errors are in spacings times the shear's jump there.
+  const double r = GENERATE(0.5, 5.0);
+  const double shear = 1 / (8 + 8 / r), jump = shear * (1 - 1 / r), mean = 0.5 * (1 + r);
+  const double without = mean_error(r, 1, 0, false) / jump, with = mean_error(r, 1, 0, true) / jump;
+  const double pulled = mean_error(r, 0, 1, true) * mean, pulled_before = mean_error(r, 0, 1, false) * mean;
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("r {}: sheared {:.3f}, {:.3f} without; pulled {:.3f}, {:.3f} without", r, with, without, pulled, pulled_before));
+  CHECK(without > 0.2);
+  CHECK(std::abs(with) < 0.01);
+  CHECK(std::abs(pulled) < 0.04);  // there is no slip below none, for r = 5
+  if (r == 5) CHECK(pulled_before > 0.15);
+}
