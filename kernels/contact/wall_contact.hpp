@@ -68,8 +68,7 @@ struct WallContacts {
   /// Of a marker's vertex; far where no wall is within reach, or the marker is not at home.
   KOKKOS_INLINE_FUNCTION WallGap of(int marker) const {
     if (!markers.home(marker)) return {};
-    const double eta[3] = {markers.eta(marker, 0), markers.eta(marker, 1), markers.eta(marker, 2)};
-    return nearest_wall(lattice, walls, eta, load(x, markers.vertex(marker)), reach);
+    return nearest_wall(lattice, walls, MarkerPlace(lattice, markers, marker).eta, load(x, markers.vertex(marker)), reach);
   }
 };
 

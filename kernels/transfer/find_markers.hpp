@@ -23,15 +23,8 @@ struct VertexPlaces {
   Array<int> beyond;            // [1] lowest vertex found beyond a side
 };
 
-/// Index coordinates in which walls are half a cell away from the first cell.
 KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const LatticePoint& q, double (&eta)[3]) {
-  for (int d = 0; d < 3; ++d) {
-    const double xi = q.xi(d);
-    eta[d] = xi;
-    if (lattice.boundary_below[d] && xi < 0) eta[d] = 0.5 * xi;
-    if (lattice.boundary_above[d] && xi > lattice.index.n[d] - 1)
-      eta[d] = lattice.index.n[d] - 1 + 0.5 * (xi - (lattice.index.n[d] - 1));
-  }
+  for (int d = 0; d < 3; ++d) eta[d] = lattice_to_index(lattice, d, q.xi(d));
 }
 
 /// Whether the kernel of a marker touches points of this rank along every direction, and whether it is beyond a side, by about
@@ -136,28 +129,18 @@ inline int number_markers(const VertexPlaces& places, const MarkerViews& markers
   return total;
 }
 
-/// Fills home and eta of the markers. Which node is nearest is rounded, so that ranks which see the same point under
+/// Fills home of the markers. Which node is nearest is rounded, so that ranks which see the same point under
 /// a shift agree on the tie.
-inline void fill_markers(const MarkerSearch& search, const VertexPlaces& places, const MarkerViews& markers) {
-  const MarkerSearch s = search;
-  const VertexPlaces in = places;
+inline void fill_markers(const MarkerSearch& search, const MarkerViews& markers) {
+  const Lattice lattice = search.lattice;
   const MarkerViews out = markers;
   Kokkos::parallel_for(
       "corpuscle::transfer::fill_markers", Policy(0, markers.count), KOKKOS_LAMBDA(int marker) {
-        const int v = out.vertex(marker);
-        const double xi[3] = {in.xi(v, 0), in.xi(v, 1), in.xi(v, 2)};
-        LatticePoint q;
-        s.lattice.set(q, xi);
-        double eta[3];
-        lattice_to_index(s.lattice, q, eta);
+        const MarkerPlace place(lattice, out, marker);
         bool home = true;
         for (int d = 0; d < 3; ++d) {
-          if (s.lattice.boundary_below[d] && eta[d] < -0.5) eta[d] = -0.5;
-          if (s.lattice.boundary_above[d] && eta[d] > s.lattice.index.n[d] - 0.5) eta[d] = s.lattice.index.n[d] - 0.5;
-          out.eta(marker, d) = eta[d];
-          const double nearest = std::floor(std::floor((eta[d] + 0.5) * 1073741824.0 + 0.5) / 1073741824.0);
-          home = home && (nearest >= 0 || s.lattice.boundary_below[d]) &&
-                 (nearest < s.lattice.index.n[d] || s.lattice.boundary_above[d]);
+          const double nearest = std::floor(std::floor((place.eta[d] + 0.5) * 1073741824.0 + 0.5) / 1073741824.0);
+          home = home && (nearest >= 0 || lattice.boundary_below[d]) && (nearest < lattice.index.n[d] || lattice.boundary_above[d]);
         }
         out.home(marker) = home ? 1 : 0;
       });

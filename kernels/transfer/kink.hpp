@@ -58,18 +58,21 @@ KOKKOS_INLINE_FUNCTION MarkerKink marker_kink(const TransferBlock& block, const 
   return kink;
 }
 
-/// The areas that a marker sees, and how they change along each direction of the grid: areas[3 d + e] is that along e. Not beside sides.
+/// The areas that a marker sees, and how they change along each direction of the grid: change[d][e] is that along e. Not beside sides.
 template <class Delta>
-KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const MarkerViews& m, int marker, Vec3 (&change)[9]) {
+KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const MarkerViews& m, int marker, Vec3 (&change)[3][3]) {
+  if (block.even) return;
   for (int d = 0; d < 3; ++d)
-    visit_sloped<Delta>(m, marker, d, [&](int i, int j, int k, double, const double(&slope)[3]) {
-      const int row[3] = {i, j, k}, c = block.index().cell(i, j, k);
-      const Vec3 area = Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c);
-      for (int e = 0; e < 3; ++e) change[3 * d + e] += slope[e] * area;
-    });
+    changes_of_mean<Delta>(
+        m, marker, d,
+        [&](int i, int j, int k) {
+          const int row[3] = {i, j, k}, c = block.index().cell(i, j, k);
+          return Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c);
+        },
+        change[d]);
 }
 
-/// markers.across and markers.dipole of the forces [vertex, 3], nN.
+/// markers.across of the forces [vertex, 3], nN, less what their dipoles have of them.
 template <class Delta>
 void resolve_kinked_forces(const TransferBlock& transfer_block, const SlipViews& slip_views, const MarkerViews& markers,
                            const Components<double>& force) {
@@ -78,23 +81,68 @@ void resolve_kinked_forces(const TransferBlock& transfer_block, const SlipViews&
   const MarkerViews m = markers;
   Kokkos::parallel_for(
       "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
-        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
+        const MarkerPlace place(block.lattice, m, marker);
+        const DualBasis dual = seen_areas<Delta>(block, m, marker, place.eta);
         Vec3 f = load(force, m.vertex(marker));
-        const MarkerKink kink = marker_kink<Delta>(block, slip, m, marker, eta);
-        for (int n = 0; n < 9; ++n) m.dipole(marker, n) = 0;
+        const MarkerKink kink = marker_kink<Delta>(block, slip, m, marker, place.eta);
         if (kink.way != 0) {
-          Vec3 change[9], rest;
+          Vec3 change[3][3], rest;
           changes_of_areas<Delta>(block, m, marker, change);
           for (int d = 0; d < 3; ++d)
-            for (int e = 0; e < 3; ++e) {
-              const double q = dot(dual.b[d], kink.of_force(f, e));
-              m.dipole(marker, 3 * d + e) = q;
-              rest += q * change[3 * d + e];
-            }
+            for (int e = 0; e < 3; ++e) rest += dot(dual.b[d], kink.of_force(f, e)) * change[d][e];
           f -= rest;
         }
         for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
+      });
+}
+
+/// markers.dipole across the faces of direction d.
+template <class Delta>
+void resolve_dipoles(const TransferBlock& transfer_block, const SlipViews& slip_views, const MarkerViews& markers,
+                     const Components<double>& force, int d) {
+  const TransferBlock block = transfer_block;
+  const SlipViews slip = slip_views;
+  const MarkerViews m = markers;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::resolve_dipoles", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        const MarkerPlace place(block.lattice, m, marker);
+        const MarkerKink kink = marker_kink<Delta>(block, slip, m, marker, place.eta);
+        const Vec3 f = load(force, m.vertex(marker));
+        const Vec3 across = kink.way != 0 ? seen_areas<Delta>(block, m, marker, place.eta).b[d] : Vec3{};
+        for (int e = 0; e < 3; ++e) m.dipole(marker, e) = kink.way != 0 ? dot(across, kink.of_force(f, e)) : 0;
+      });
+}
+
+/// spread_forces() of markers with dipoles, of direction d alone.
+template <class Delta>
+void spread_dipoles(const TransferBlock& block, const MarkerViews& markers, int direction, const Array<double>& across) {
+  const MarkerViews m = markers;
+  const IndexSpace index = block.index();
+  const Array<double> out = across;
+  const int d = direction;
+  for_box(
+      "corpuscle::transfer::spread_dipoles", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
+      KOKKOS_LAMBDA(int i, int j, int k) {
+        constexpr int points = Delta::points;
+        const int at[3] = {i, j, k};
+        double sum = 0;
+        visit_markers<Delta>(index, m, i, j, k, [&](int marker) {
+          double w[3], slope[3];
+          int line[3], point[3];
+          for (int e = 2; e >= 0; --e) {
+            line[e] = e == d ? 3 + e : e;
+            point[e] = at[e] - m.base(marker, line[e]);
+            w[e] = point[e] >= 0 && point[e] < points ? m.weight(marker, line[e] * points + point[e]) : 0;
+            if (w[e] == 0) return;
+          }
+          sum += w[0] * w[1] * w[2] * m.across(marker, d);
+          const double q[3] = {m.dipole(marker, 0), m.dipole(marker, 1), m.dipole(marker, 2)};
+          if (q[0] == 0 && q[1] == 0 && q[2] == 0) return;  // the weights of those that are folded back have no slopes
+          for (int e = 0; e < 3; ++e)
+            slope[e] = Delta::slope([&](int p) { return m.weight(marker, line[e] * points + p); }, point[e]);
+          sum += q[0] * slope[0] * w[1] * w[2] + q[1] * w[0] * slope[1] * w[2] + q[2] * w[0] * w[1] * slope[2];
+        });
+        out(index.cell(i, j, k)) = sum;
       });
 }
 
@@ -109,22 +157,25 @@ void add_kinks(const TransferBlock& transfer_block, const SlipViews& slip_views,
   const FaceForce through{{flux[0], flux[1], flux[2]}};
   Kokkos::parallel_for(
       "corpuscle::transfer::add_kinks", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const MarkerPlace place(block.lattice, m, marker);
+        const double(&eta)[3] = place.eta;
         const MarkerKink kink = marker_kink<Delta>(block, slip, m, marker, eta);
         if (kink.way == 0) return;
         const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
-        Vec3 change[9], du[3];
+        Vec3 change[3][3], du[3];
         changes_of_areas<Delta>(block, m, marker, change);
         const int v = m.vertex(marker);
         const Vec3 own = load(of_vertex, v);
         for (int d = 0; d < 3; ++d) {
           double sum[3] = {0, 0, 0};
-          visit_sloped<Delta>(m, marker, d, [&](int i, int j, int k, double, const double(&slope)[3]) {
-            if (!block.owns(0, d == 0, i) || !block.owns(1, d == 1, j) || !block.owns(2, d == 2, k)) return;
-            const double across = through(d, block.index().cell(i, j, k));
-            for (int e = 0; e < 3; ++e) sum[e] += slope[e] * across;
-          });
-          for (int e = 0; e < 3; ++e) du[e] += (sum[e] - dot(change[3 * d + e], own)) * dual.b[d];
+          changes_of_mean<Delta>(
+              m, marker, d,
+              [&](int i, int j, int k) {
+                const bool owned = block.owns(0, d == 0, i) && block.owns(1, d == 1, j) && block.owns(2, d == 2, k);
+                return owned ? through(d, block.index().cell(i, j, k)) : 0.0;
+              },
+              sum);
+          for (int e = 0; e < 3; ++e) du[e] += (sum[e] - dot(change[d][e], own)) * dual.b[d];
         }
         Vec3 moved = own;
         for (int e = 0; e < 3; ++e) moved += kink.of_gradient(du[e], e);

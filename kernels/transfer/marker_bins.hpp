@@ -7,17 +7,19 @@
 namespace corpuscle {
 
 /// The cell of this block, halo included, that a marker is in.
-KOKKOS_INLINE_FUNCTION int marker_cell(const MarkerViews& m, const IndexSpace& index, int marker) {
-  return index.cell(static_cast<int>(std::floor(m.eta(marker, 0) + 0.5)), static_cast<int>(std::floor(m.eta(marker, 1) + 0.5)),
-                    static_cast<int>(std::floor(m.eta(marker, 2) + 0.5)));
+KOKKOS_INLINE_FUNCTION int marker_cell(const MarkerViews& m, const Lattice& lattice, int marker) {
+  const MarkerPlace place(lattice, m, marker);
+  return lattice.index.cell(static_cast<int>(std::floor(place.eta[0] + 0.5)), static_cast<int>(std::floor(place.eta[1] + 0.5)),
+                            static_cast<int>(std::floor(place.eta[2] + 0.5)));
 }
 
 /// Fills m.start and m.order.
-inline void sort_markers(const IndexSpace& index, const MarkerViews& markers) {
+inline void sort_markers(const Lattice& of_block, const MarkerViews& markers) {
   const MarkerViews m = markers;
+  const Lattice lattice = of_block;
   counting_sort(
-      "corpuscle::transfer::sort_markers", m.count, index.size(),
-      KOKKOS_LAMBDA(int marker) { return marker_cell(m, index, marker); }, m.start, m.order);
+      "corpuscle::transfer::sort_markers", m.count, lattice.index.size(),
+      KOKKOS_LAMBDA(int marker) { return marker_cell(m, lattice, marker); }, m.start, m.order);
 }
 
 }  // namespace corpuscle

@@ -8,16 +8,16 @@
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 210 bytes, 282 with dipoles.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 190 bytes, 214 with dipoles.
 struct MarkerViews {
   int count = 0;
   Array<int> vertex;            // [marker] where it comes from
   Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex and its copies, of all ranks, that lies in its rank's own cells
-  Table<double> eta;            // [marker, 3] position in index space: cells of this rank at 0, 1, ...; walls half a cell away
+  Table<double> xi;             // [vertex, 3] places in the lattice: VertexPlaces::xi
   Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
   Table<double> weight;         // [marker, 6 points] of those lines of points
   Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
-  Table<double> dipole;         // [marker, 9] the same of its changes, 3 d + e along e (kink.hpp); without values there are none
+  Table<double> dipole;         // [marker, 3] the same of its changes along each direction, across the faces of one (kink.hpp)
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers
   Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces
@@ -27,6 +27,7 @@ struct MarkerViews {
 struct TransferBlock {
   Lattice lattice;
   Components<double> area[3], sharp_area[3];  // of faces, and as sharpen_faces() makes them
+  bool even = false;                          // all faces of a direction have the same
   /// [direction][end][0: other velocities, 1: the normal one] by which a velocity is reflected beyond a side: -1 where the side
   /// gives it, +1 where it gives the derivative.
   double reflection[3][2][2];
@@ -37,6 +38,27 @@ struct TransferBlock {
     return index().n[e] + (faces && lattice.boundary_above[e] ? 1 : 0);
   }
   KOKKOS_INLINE_FUNCTION bool owns(int e, bool faces, int row) const { return row >= 0 && row < rows(e, faces); }
+};
+
+/// Index coordinates in which walls are half a cell away from the first cell, of one direction of the lattice.
+KOKKOS_INLINE_FUNCTION double lattice_to_index(const Lattice& lattice, int d, double xi) {
+  const int last = lattice.index.n[d] - 1;
+  if (lattice.boundary_below[d] && xi < 0) return 0.5 * xi;
+  if (lattice.boundary_above[d] && xi > last) return last + 0.5 * (xi - last);
+  return xi;
+}
+
+/// A marker's position in index space: cells of this rank at 0, 1, ...; walls half a cell away, and nothing beyond them.
+struct MarkerPlace {
+  double eta[3];
+
+  KOKKOS_INLINE_FUNCTION MarkerPlace(const Lattice& lattice, const MarkerViews& m, int marker) {
+    const int v = m.vertex(marker);
+    for (int d = 0; d < 3; ++d) {
+      const double at = lattice_to_index(lattice, d, m.xi(v, d)), end = lattice.index.n[d] - 0.5;
+      eta[d] = lattice.boundary_below[d] && at < -0.5 ? -0.5 : (lattice.boundary_above[d] && at > end ? end : at);
+    }
+  }
 };
 
 /// The points along one direction that a marker reaches.

@@ -20,7 +20,8 @@ inline NearSide nearest_to_side(const TransferBlock& transfer_block, const Marke
       "corpuscle::transfer::nearest_to_side", Policy(0, m.count),
       KOKKOS_LAMBDA(int marker, Reducer::value_type& least) {
         if (!m.home(marker)) return;
-        const double xi[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const MarkerPlace place(lattice, m, marker);
+        const double(&xi)[3] = place.eta;
         LatticePoint q;
         lattice.set(q, xi);
         Vec3 tangent[3];

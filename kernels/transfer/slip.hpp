@@ -129,7 +129,8 @@ KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const Slip
   const int v = m.vertex(marker);
   const double between = slip_between(slip.law, slip.ratio_of(v));
   if (between == 0) return {};
-  const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+  const MarkerPlace place(block.lattice, m, marker);
+  const double(&eta)[3] = place.eta;
   Vec3 along[3];
   tangents_at(block, eta, along);
   const Vec3 n = load(slip.normal, v), f = (slip.followed.extent(0) > 0 ? slip.followed(v, 0) : 1.0) * load(slip.force, v);

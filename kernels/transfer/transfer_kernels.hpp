@@ -74,9 +74,10 @@ KOKKOS_INLINE_FUNCTION bool is_folded(const TransferBlock& block, const double (
   return folded;
 }
 
-/// Calls visit(i, j, k, weight, how it changes along each direction of the grid) for the faces of direction d of a marker that is not folded.
-template <class Delta, class Visit>
-KOKKOS_INLINE_FUNCTION void visit_sloped(const MarkerViews& m, int marker, int d, const Visit& visit) {
+/// How the mean of value(i, j, k) over the faces of direction d that a marker reaches, which is not folded, changes along each direction of
+/// the grid.
+template <class Delta, class Value, class Sum>
+KOKKOS_INLINE_FUNCTION void changes_of_mean(const MarkerViews& m, int marker, int d, const Value& value, Sum (&change)[3]) {
   constexpr int points = Delta::points;
   double weight[3][points], slope[3][points];
   int base[3];
@@ -87,18 +88,27 @@ KOKKOS_INLINE_FUNCTION void visit_sloped(const MarkerViews& m, int marker, int d
     for (int p = 0; p < points; ++p) slope[e][p] = Delta::slope([&](int q) { return weight[e][q]; }, p);
   }
   for (int k = 0; k < points; ++k)
-    for (int j = 0; j < points; ++j)
+    for (int j = 0; j < points; ++j) {
+      Sum mean{}, steep{};
       for (int i = 0; i < points; ++i) {
-        const double changes[3] = {slope[0][i] * weight[1][j] * weight[2][k], weight[0][i] * slope[1][j] * weight[2][k],
-                                   weight[0][i] * weight[1][j] * slope[2][k]};
-        visit(base[0] + i, base[1] + j, base[2] + k, weight[0][i] * weight[1][j] * weight[2][k], changes);
+        const Sum here = value(base[0] + i, base[1] + j, base[2] + k);
+        mean += weight[0][i] * here;
+        steep += slope[0][i] * here;
       }
+      change[0] += (weight[1][j] * weight[2][k]) * steep;
+      change[1] += (slope[1][j] * weight[2][k]) * mean;
+      change[2] += (weight[1][j] * slope[2][k]) * mean;
+    }
 }
 
 /// The same as seen_areas() of its place, with the weights that it has.
 template <class Delta>
 KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const MarkerViews& m, int marker, const double (&eta)[3]) {
   if (is_folded<Delta>(block, eta)) return seen_areas<Delta>(block, eta);
+  if (block.even) {
+    const int any = block.index().cell(0, 0, 0);
+    return DualBasis(load(block.sharp_area[0], any), load(block.sharp_area[1], any), load(block.sharp_area[2], any));
+  }
   constexpr int points = Delta::points;
   Vec3 seen[3];
   for (int d = 0; d < 3; ++d) {
@@ -128,7 +138,8 @@ void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& mar
   Kokkos::parallel_for(
       "corpuscle::transfer::prepare_markers", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         constexpr int points = Delta::points;
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const MarkerPlace place(block.lattice, m, marker);
+        const double(&eta)[3] = place.eta;
         for (int e = 0; e < 3; ++e)
           for (int faces = 0; faces < 2; ++faces) {
             const DeltaLine<Delta> line = delta_line<Delta>(block, e, faces == 1, eta[e]);
@@ -151,7 +162,8 @@ void resolve_forces(const TransferBlock& transfer_block, const MarkerViews& mark
   const MarkerViews m = markers;
   Kokkos::parallel_for(
       "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const MarkerPlace place(block.lattice, m, marker);
+        const double(&eta)[3] = place.eta;
         const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
         const Vec3 f = load(force, m.vertex(marker));
         for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
@@ -180,60 +192,45 @@ void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) 
       });
 }
 
-/// What a marker's dipoles add to the forces across the faces of a cell that it reaches with the weights w.
-template <class Delta>
-KOKKOS_INLINE_FUNCTION void add_dipoles(const MarkerViews& m, int marker, const int (&at)[3], const double (&w)[6], double (&sum)[3]) {
-  constexpr int points = Delta::points;
-  bool any = false;  // the weights of those that are folded back have no slopes
-  for (int n = 0; n < 9; ++n) any = any || m.dipole(marker, n) != 0;
-  if (!any) return;
-  double change[6];
-  for (int e = 0; e < 6; ++e)
-    change[e] = w[e] == 0 ? 0 : Delta::slope([&](int p) { return m.weight(marker, e * points + p); }, at[e % 3] - m.base(marker, e));
-  for (int d = 0; d < 3; ++d) {
-    int line[3];
-    for (int e = 0; e < 3; ++e) line[e] = e == d ? 3 + e : e;
-    sum[d] += change[line[0]] * w[line[1]] * w[line[2]] * m.dipole(marker, 3 * d) +
-              w[line[0]] * change[line[1]] * w[line[2]] * m.dipole(marker, 3 * d + 1) +
-              w[line[0]] * w[line[1]] * change[line[2]] * m.dipole(marker, 3 * d + 2);
-  }
+/// Calls visit(marker) for the markers that may reach cell (i, j, k) or its low
+/// faces, in the order of cells and of markers in them.
+template <class Delta, class Visit>
+KOKKOS_INLINE_FUNCTION void visit_markers(const IndexSpace& index, const MarkerViews& m, int i, int j, int k, const Visit& visit) {
+  constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;  // cells whose markers reach
+  const int last = m.near(index.cell(i, j, k)) ? above : below - 1;
+  for (int dk = below; dk <= last; ++dk)
+    for (int dj = below; dj <= above; ++dj) {
+      const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
+      for (int s = m.start(line); s < end; ++s) visit(m.order(s));
+    }
 }
 
 /// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
-/// @tparam dipoles  of markers with them
-template <class Delta, bool dipoles>
+template <class Delta>
 void spread_forces(const TransferBlock& block, const MarkerViews& markers, const FaceForce& force) {
   const MarkerViews m = markers;
   const IndexSpace index = block.index();
   const FaceForce out = force;
-  constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;  // cells whose markers reach a cell or its low faces
   for_box(
       "corpuscle::transfer::spread_forces", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
       KOKKOS_LAMBDA(int i, int j, int k) {
         constexpr int points = Delta::points;
         const int at[3] = {i, j, k}, c = index.cell(i, j, k);
-        const int last = m.near(c) ? above : below - 1;
         double sum[3] = {0, 0, 0};
-        for (int dk = below; dk <= last; ++dk)
-          for (int dj = below; dj <= above; ++dj) {
-            const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
-            for (int s = m.start(line); s < end; ++s) {
-              const int marker = m.order(s);
-              double w[6];
-              const auto reached = [&](int d) {  // along d, by cells or faces
-                for (int e = d; e < 6; e += 3) {
-                  const int p = at[d] - m.base(marker, e);
-                  w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
-                }
-                return w[d] != 0 || w[d + 3] != 0;
-              };
-              if (!reached(2) || !reached(1) || !reached(0)) continue;
-              sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
-              sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
-              sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
-              if constexpr (dipoles) add_dipoles<Delta>(m, marker, at, w, sum);
+        visit_markers<Delta>(index, m, i, j, k, [&](int marker) {
+          double w[6];
+          const auto reached = [&](int d) {  // along d, by cells or faces
+            for (int e = d; e < 6; e += 3) {
+              const int p = at[d] - m.base(marker, e);
+              w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
             }
-          }
+            return w[d] != 0 || w[d + 3] != 0;
+          };
+          if (!reached(2) || !reached(1) || !reached(0)) return;
+          sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
+          sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
+          sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
+        });
         for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
       });
 }
@@ -291,7 +288,8 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
       "corpuscle::transfer::interpolate_velocity", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         constexpr int points = Delta::points;
         const IndexSpace& index = block.index();
-        const double eta[3] = {m.eta(marker, 0), m.eta(marker, 1), m.eta(marker, 2)};
+        const MarkerPlace place(block.lattice, m, marker);
+        const double(&eta)[3] = place.eta;
         const bool folded = is_folded<Delta>(block, eta);
         const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
         Vec3 part;

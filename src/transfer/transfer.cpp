@@ -48,6 +48,28 @@ double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   return link;
 }
 
+/// Whether all faces of each direction have the same area, to round-off (all ranks call).
+bool are_even(const Grid& grid, const Components<double> (&area)[3]) {
+  constexpr double round_off = 1e-12;
+  const IndexSpace& index = grid.index();
+  bool even = true;
+  for (int d = 0; d < 3; ++d) {
+    const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), area[d]);
+    const CellBox box = face_box(index, d);
+    double lowest[3] = {1e300, 1e300, 1e300}, highest[3] = {-1e300, -1e300, -1e300}, size = 0;
+    for (int k = box.lower[2]; k < box.upper[2]; ++k)
+      for (int j = box.lower[1]; j < box.upper[1]; ++j)
+        for (int i = box.lower[0]; i < box.upper[0]; ++i) {
+          const Vec3 here = load(host, index.cell(i, j, k));
+          size = std::max(size, norm(here));
+          for (int m = 0; m < 3; ++m) lowest[m] = std::min(lowest[m], here[m]), highest[m] = std::max(highest[m], here[m]);
+        }
+    for (int m = 0; m < 3; ++m)
+      if (grid.comm().max(highest[m]) - grid.comm().min(lowest[m]) > round_off * grid.comm().max(size)) even = false;
+  }
+  return even;
+}
+
 void set_reflections(const std::vector<BoundarySettings>& boundaries, TransferBlock& block) {
   using Type = BoundarySettings::Type;
   for (const auto& boundary : boundaries) {
@@ -81,6 +103,7 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   }
   with_kernel([&](auto delta) { moment_ = decltype(delta)::moment; });
   if (moment_ > 0) prepare_sharpening();
+  block_.even = are_even(grid, block_.area);
   set_reflections(boundaries, block_);
   search_.lattice = block_.lattice;
   largest_spacing_ = find_bounds(block_.lattice, search_);
@@ -112,7 +135,6 @@ void Transfer::make_room(int markers) {
     room_ = markers + markers / 64 + 1;
     markers_.vertex = make<Array<int>>("marker_vertex", room_);
     markers_.home = make<Array<unsigned char>>("marker_home", room_);
-    markers_.eta = make<Table<double>>("marker_eta", room_, 3);
     markers_.base = make<Table<short>>("marker_base", room_, 6);
     markers_.order = make<Array<int>>("marker_order", room_);
   }
@@ -125,7 +147,7 @@ void Transfer::weigh() {
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
   const auto rows = static_cast<std::size_t>(markers_.count);
-  const std::size_t dipoles = ratios_.empty() ? 0 : 9;
+  const std::size_t dipoles = ratios_.empty() ? 0 : 3;
   double* memory = workspace_->reserve((6 * points + 3 + dipoles) * rows);
   markers_.weight = Table<double>(memory, rows, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
@@ -142,8 +164,9 @@ int Transfer::place(const Components<double>& x) {
   const bool again = markers_.count > room_;
   make_room(markers_.count);
   if (again) number_markers(places_, markers_, room_);
-  fill_markers(search_, places_, markers_);
-  sort_markers(block_.index(), markers_);
+  markers_.xi = places_.xi;
+  fill_markers(search_, markers_);
+  sort_markers(block_.lattice, markers_);
   weighed_ = false;
   const int beyond = beyond_host_.read()(0);
   return beyond < no_vertex ? beyond : -1;
@@ -195,10 +218,13 @@ void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* su
   with_kernel([&](auto delta) {
     if (slip && !ratios_.empty()) {
       resolve_kinked_forces<decltype(delta)>(block_, *slip, markers_, force);
-      spread_forces<decltype(delta), true>(block_, markers_, spread);
+      for (int d = 0; d < 3; ++d) {  // one by one, for the memory
+        resolve_dipoles<decltype(delta)>(block_, *slip, markers_, force, d);
+        spread_dipoles<decltype(delta)>(block_, markers_, d, spread.across[d]);
+      }
     } else {
       resolve_forces<decltype(delta)>(block_, markers_, force);
-      spread_forces<decltype(delta), false>(block_, markers_, spread);
+      spread_forces<decltype(delta)>(block_, markers_, spread);
     }
   });
   for (int d = 0; d < 3 && sharp; ++d) {
