@@ -48,6 +48,9 @@ double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   return link;
 }
 
+using Fluxes = Array<double>[3];
+const Fluxes& const_fluxes(const Fluxes& fluxes) { return fluxes; }
+
 /// Whether all faces of each direction have the same area, to round-off (all ranks call).
 bool are_even(const Grid& grid, const Components<double> (&area)[3]) {
   constexpr double round_off = 1e-12;
@@ -264,9 +267,10 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
     grid_->halo().exchange(raw_[d]);
     sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
   }
+  const auto& through = sharp ? const_fluxes(sharp_flux_) : flux;
   with_kernel([&](auto delta) {
-    interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : flux, u, markers_, velocity);
-    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, sharp ? sharp_flux_ : flux, markers_, velocity);
+    interpolate_velocity<decltype(delta)>(block_, through, u, markers_, velocity);
+    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, through, markers_, velocity);
   });
   if (slip) add_slip(block_, *slip, markers_, velocity);
 }
@@ -282,7 +286,8 @@ double Transfer::power_on_sides(const Components<double>& force, const Component
     if (sharp) sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
   }
   Kokkos::deep_copy(room, 0.0);
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, sharp ? sharp_flux_ : raw_, u, markers_, room); });
+  const auto& through = const_fluxes(sharp ? sharp_flux_ : raw_);
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, through, u, markers_, room); });
   return power_of(places_.vertices, force, room);
 }
 
