@@ -121,8 +121,9 @@ inline void correct_velocity(const GridViews& grid, const Array<NodeKind>& kind,
 /// share = 1 it is only just stable: beside bodies, where the velocity is reconstructed, the force on a sphere held in a
 /// flow oscillated with growing amplitude from nu dt / h^2 of about 20 on, and a cell in a grid of 0.1 um blew up. Shares
 /// below 2/3 are stable for any step in three dimensions (Guermond, Minev and Shen, Comput. Methods Appl. Mech. Eng.
-/// 195, 2006) and keep the order; the sphere's force is then steady to five digits. `negative` is -V div u* in
-/// compact order.
+/// 195, 2006) and keep the order; the sphere's force is then steady to five digits. Where the viscosity varies the pressure goes by
+/// what yields most about a cell: by the cell's own viscosity it overshot beside a thinner fluid or a side, and between cells with 20 to
+/// 50 times the viscosity of the fluid around it blew up. `negative` is -V div u* in compact order.
 template <class Viscosity>
 void update_pressure(const GridViews& grid, const Array<NodeKind>& kind, double mass, double mu, const Viscosity& viscosity,
                      const Array<double>& psi, const Array<double>& negative, const Array<double>& p) {
@@ -133,7 +134,7 @@ void update_pressure(const GridViews& grid, const Array<NodeKind>& kind, double 
   for_owned("corpuscle::fluid::update_pressure", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     if (kind(c) == NodeKind::fluid) 
-      p(c) += mass * psi(c) + share * mu * relative_viscosity(relative, c) * negative(index.compact(i, j, k)) / volume(c);
+      p(c) += mass * psi(c) + share * mu * yielding_viscosity(relative, index, c) * negative(index.compact(i, j, k)) / volume(c);
   });
 }
 

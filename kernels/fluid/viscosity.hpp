@@ -21,6 +21,13 @@ struct VaryingViscosity {
 
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const UniformViscosity&, int) { return 1; }
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const VaryingViscosity& v, int c) { return v.relative(c); }
+/// About a cell: the harmonic mean over its faces of the viscosities on both sides of each.
+KOKKOS_FORCEINLINE_FUNCTION double yielding_viscosity(const UniformViscosity&, const IndexSpace&, int) { return 1; }
+KOKKOS_FORCEINLINE_FUNCTION double yielding_viscosity(const VaryingViscosity& v, const IndexSpace& index, int c) {
+  double beyond = 0;
+  for (int d = 0; d < 3; ++d) beyond += 1 / v.relative(c - index.stride(d)) + 1 / v.relative(c + index.stride(d));
+  return 2 / (1 / v.relative(c) + beyond / 6);
+}
 /// On the face between two nodes.
 KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const UniformViscosity&, int, int) { return 1; }
 KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const VaryingViscosity& v, int a, int b) {
