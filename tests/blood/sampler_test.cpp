@@ -91,7 +91,8 @@ TEST_CASE("reported means and errors have the samples' values, in the report's u
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
   BloodSampler sampler(scene, simulation);
-  // As a checkpoint has them, but for the samples: 256, of which sixteen in a row have the same mean.
+  // As a checkpoint has them, but for the samples: 256, of which sixteen in a row are by turns larger and smaller than
+  // those before, so that their error is known.
   constexpr int settings = 6;
   enum { hematocrit, mean_speed, cell_speed, discharge, drag, wall_rate, layer, first_bin };
   std::vector<double> state = sampler.state();
@@ -100,7 +101,7 @@ TEST_CASE("reported means and errors have the samples' values, in the report's u
   RunningMeans means(quantities);
   for (int n = 0; n < 256; ++n) {
     std::vector<double> values;
-    for (int q = 0; q < quantities; ++q) values.push_back(1e-3 * (q + 2 + (7 * n + 3 * q) % 16 / 16.0));
+    for (int q = 0; q < quantities; ++q) values.push_back(1e-3 * (q + 2 + (7 * n + 3 * q) % 16 / 16.0 + 0.1 * (n / 16 % 2)));
     means.add(values);
   }
   const auto samples = means.state();

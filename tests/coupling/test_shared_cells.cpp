@@ -324,8 +324,9 @@ TEST_CASE("every block has the cells that reach into it, however they travel", "
 TEST_CASE("a cell may start any number of periods beyond a side", "[coupling][cells][ranks]") {
   Case scene = carried_capsules(15);
   for (CellSettings& cell : scene.cells) cell.center_um[0] += 3 * 8, cell.center_um[2] -= 8;
-  Grid grid(Comm(), make_node_source(*scene.grid), {true, false, true});
+  Grid grid(Comm(), make_node_source(*scene.grid), {true, true, true});
   SharedCells cells(places_of(scene.cells), grid, IndexSpace::halo, 0.0);
+  cells.to_copies(cells.surfaces().x, true);
   CHECK(cells.membranes().cells() == static_cast<int>(cells.own().size()));
   for (const CellRecord& cell : cells.own()) {
     CHECK(cell.laps[0] == 3);
