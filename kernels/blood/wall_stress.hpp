@@ -9,8 +9,9 @@
 namespace corpuscle {
 
 /// Force of the fluid on a wall's face, along it, nN: what the momentum equation takes from the cell beside it, so that
-/// all of them together hold what drives the flow. Where the wall's stress is wanted no better derivative is: in a
-/// steady flow along straight walls this one is exact, since it is what the flow has been solved with.
+/// all of them together hold what drives the flow, but for what cells within the kernel's reach of a wall have on it
+/// themselves (Coupling::power_on_sides()). Where the wall's stress is wanted no better derivative is: in a steady flow
+/// along straight walls this one is exact, since it is what the flow has been solved with.
 /// @param face  its number, that of the cell above it; end: 0 or 1, whether the wall is at the low or the high end of d
 template <bool skewed>
 KOKKOS_INLINE_FUNCTION Vec3 wall_face_force(const ViscousCoefficients& g, const IndexSpace& index,
@@ -22,7 +23,7 @@ KOKKOS_INLINE_FUNCTION Vec3 wall_face_force(const ViscousCoefficients& g, const 
   return force - (dot(force, area) / dot(area, area)) * area;
 }
 
-/// stress [cell, 3] of owned cells, kPa: the mean over a cell's walls; zero where it has none.
+/// stress [cell, 3] of owned cells, kPa, of the fluid alone: the mean over a cell's walls; zero where it has none.
 template <bool skewed>
 void wall_stress_field(const GridViews& grid, const ViscousCoefficients& coefficients, const WallSides& sides,
                        double viscosity, const Components<double>& u, const Components<double>& stress) {

@@ -5,6 +5,7 @@
 #include "common/sums.hpp"
 #include "common/vec3.hpp"
 #include "immersed/surface_views.hpp"
+#include "immersed/wrap.hpp"
 
 namespace corpuscle {
 
@@ -46,20 +47,38 @@ inline void measure_boxes(const SurfaceSet& set, int cells, double ahead_us, con
       });
 }
 
-/// Whether any cell's box reaches further than `skin` beyond what it was.
-inline bool boxes_left(int cells, const Table<double>& now, const Table<double>& before, double skin) {
-  int left = 0;
+/// Whether any cell's box reaches further than `skin` beyond what it was, and whether any cell's mean is further beyond a periodic
+/// side than a share of the period.
+struct Departures {
+  bool box = false, mean = false;
+};
+
+/// Along a period: how far a place is from the frame's origin, in periods.
+KOKKOS_INLINE_FUNCTION double periods_from_origin(const PeriodicFrame& frame, const Vec3& place, int d) {
+  return dot(place - frame.origin, frame.dual[d]);
+}
+
+inline Departures find_departures(int cells, const Table<double>& now, const Table<double>& before, double skin,
+                                  const PeriodicFrame& frame, double share) {
+  Sums<2> left;
   Kokkos::parallel_reduce(
-      "corpuscle::cells::boxes_left", Policy(0, cells),
-      KOKKOS_LAMBDA(int cell, int& sum) {
+      "corpuscle::cells::find_departures", Policy(0, cells),
+      KOKKOS_LAMBDA(int cell, Sums<2>& sum) {
         bool within = true;  // false for what is not a number
-        for (int d = 0; d < 3; ++d)
+        Vec3 mean;
+        for (int d = 0; d < 3; ++d) {
           within = within && now(cell, BoxColumn::lower + d) >= before(cell, BoxColumn::lower + d) - skin &&
                    now(cell, BoxColumn::upper + d) <= before(cell, BoxColumn::upper + d) + skin;
-        sum += within ? 0 : 1;
+          mean[d] = now(cell, BoxColumn::mean + d);
+        }
+        sum[0] += within ? 0 : 1;
+        for (int d = 0; d < 3; ++d) {
+          const double along = periods_from_origin(frame, mean, d);
+          if (frame.periodic[d] && (along < -share || along >= 1 + share)) sum[1] += 1;
+        }
       },
       left);
-  return left > 0;
+  return {left[0] > 0, left[1] > 0};
 }
 
 /// Moves the first cells of a set. @param shift  [cell, 3] um

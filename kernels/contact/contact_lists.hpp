@@ -1,6 +1,8 @@
 // Which triangles may touch which vertices, found through bins.
 #pragma once
 
+#include <cstdint>
+
 #include <string>
 
 #include "contact/contact_views.hpp"
@@ -78,15 +80,16 @@ struct ContactSearch {
   }
 };
 
-/// From numbers to the first of each vertex, in place, over [vertex + 1]. @returns their sum
-inline int numbers_to_starts(const std::string& label, const Array<int>& numbers, int vertices) {
+/// From numbers to the first of each vertex, in place, over [vertex + 1]. @returns their sum; where it is beyond an int's largest
+/// the firsts mean nothing
+inline std::int64_t numbers_to_starts(const std::string& label, const Array<int>& numbers, int vertices) {
   const auto first = numbers;
-  int total = 0;
+  std::int64_t total = 0;
   Kokkos::parallel_scan(
       label, Policy(0, vertices + 1),
-      KOKKOS_LAMBDA(int v, int& sum, bool last) {
+      KOKKOS_LAMBDA(int v, std::int64_t& sum, bool last) {
         const int own = v < vertices ? first(v) : 0;
-        if (last) first(v) = sum;
+        if (last) first(v) = static_cast<int>(sum);
         sum += own;
       },
       total);
@@ -94,7 +97,7 @@ inline int numbers_to_starts(const std::string& label, const Array<int>& numbers
 }
 
 /// lists.first, and how many items there are.
-inline int count_items(const ContactSearch& search, const ContactLists& lists) {
+inline std::int64_t count_items(const ContactSearch& search, const ContactLists& lists) {
   const ContactSearch s = search;
   const auto first = lists.first;
   const int vertices = s.surface.vertices;
@@ -127,9 +130,9 @@ inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
       });
 }
 
-/// From numbers to first_group. @returns how many groups there are
+/// From numbers to first_group. @returns how many groups there are, of no more items than an int counts
 inline int number_groups(const ContactLists& lists, int vertices) {
-  return numbers_to_starts("corpuscle::contact::first_groups", lists.first_group, vertices);
+  return static_cast<int>(numbers_to_starts("corpuscle::contact::first_groups", lists.first_group, vertices));
 }
 
 }  // namespace corpuscle

@@ -56,6 +56,29 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
   return nearest;
 }
 
+/// The least way from a side to the other end of this block along d, um.
+inline double least_thickness(const Lattice& of_block, int d, int end) {
+  const Lattice lattice = of_block;
+  const int e = (d + 1) % 3, f = (d + 2) % 3, across = lattice.index.n[e], last = lattice.index.n[d];
+  double least = 1e30;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::least_thickness", Policy(0, across * lattice.index.n[f]),
+      KOKKOS_LAMBDA(int n, double& sum) {
+        double xi[3];
+        xi[e] = n % across, xi[f] = n / across;
+        Vec3 at[2], tangent[3];
+        for (int far = 0; far < 2; ++far) {
+          LatticePoint q;
+          xi[d] = end == 0 ? (far == 0 ? -1 : last - 0.5) : (far == 0 ? last : -0.5);
+          lattice.set(q, xi);
+          lattice.map(q, at[far], tangent);
+        }
+        sum = smaller(sum, norm(at[1] - at[0]));
+      },
+      Smallest(least));
+  return least;
+}
+
 /// Walls beside vertices whose markers are at home. Vertices may have moved on since the markers were placed, by less than walls
 /// bend.
 struct WallContacts {

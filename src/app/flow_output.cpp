@@ -228,13 +228,13 @@ void FlowOutput::stop() {
   if (history_) measure_bodies();
 }
 
-void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& totals) {
+void FlowOutput::started_from(const std::string& checkpoint, const RunTotals& totals, const std::vector<std::string>& changed) {
   last_checkpoint_ = checkpoint;
   totals_ = totals;
   energy_.resume(totals.energy);
   if (simulation_.immersed()) simulation_.immersed()->resume(totals.immersed);
   if (simulation_.coupling()) simulation_.coupling()->resume_contact(totals.contact);
-  if (blood_) blood_->resume(totals.blood);
+  if (blood_) blood_->resume(totals.blood, changed);
 }
 
 /// All that has been counted, of this run and those before it.

@@ -31,7 +31,8 @@ class FlowOutput {
   void stop();
   const std::string& last_checkpoint() const { return last_checkpoint_; }
   /// The checkpoint that the run was started from is good until a newer one is written; the report goes on from its totals.
-  void started_from(const std::string& checkpoint, const RunTotals& totals);
+  /// @param changed  keys of the case that are others than until then
+  void started_from(const std::string& checkpoint, const RunTotals& totals, const std::vector<std::string>& changed);
   /// Errors, iterations, counts and times gathered over the run, and over those that it goes on from.
   void fill(Report& report);
   /// The same where the state is of no use.

@@ -200,7 +200,7 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
                                           totals ? std::optional(simulation.time()) : std::nullopt, start);
     if (totals) {
       on_root(comm, [&] { std::filesystem::remove(place.folder + "/report.json"); });  // of the run until the checkpoint
-      output->started_from(options.restart, *totals);
+      output->started_from(options.restart, *totals, changed);
     } else {
       output->after_step(true);
     }

@@ -54,7 +54,8 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
       settings_(*scene.blood),
       boundaries_(scene.boundaries),
       every_us_(sampling_interval(scene)),
-      flow_(find_guided_flow(scene, simulation.fluid())) {
+      flow_(find_guided_flow(scene, simulation.fluid())),
+      began_us_(scene.blood->from_us) {
   if (!flow_) no_flow_ = why_unguided(scene);
   if (flow_) frame_ = flow_->frame;
   if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
@@ -62,6 +63,7 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
   if (frame_.guided()) windows_ = std::max(1, static_cast<int>(std::lround(frame_.length / settings_.layer_window_um)));
   means_ = RunningMeans(first_bin + 2 * bins_);
   make_profile();
+  if (by_walls()) mark_walls();
   cell_totals_ = Array<double>("corpuscle::blood::cell_totals", CellFlowColumn::within + bins_);
   cell_totals_host_ = HostCopy(cell_totals_);
   cell_sums_.resize(cell_totals_.size());
@@ -159,7 +161,28 @@ void BloodSampler::measure_layer() {
   last_.cell_free_layer_um = cell_free_layer(frame_, windows_, edge.data());
 }
 
-/// Stress on the walls, kPa, and the rate at which they move past each other, 1/us.
+/// Forward along the lower wall and backward along the upper one.
+void BloodSampler::mark_walls() {
+  Grid& grid = simulation_.grid();
+  const IndexSpace& index = grid.index();
+  along_walls_ = Components<double>("corpuscle::blood::along_walls", index.size(), 3);
+  const auto host = Kokkos::create_mirror_view(along_walls_);
+  Kokkos::deep_copy(host, 0.0);
+  const int d = flow_->across, halo = IndexSpace::halo;
+  for (int end = 0; end < 2; ++end) {
+    if (grid.halo().neighbour(d, end) >= 0) continue;
+    int low[3], high[3];
+    for (int e = 0; e < 3; ++e) low[e] = -halo, high[e] = index.n[e] + halo - 1;
+    low[d] = high[d] = end == 0 ? -1 : index.n[d];
+    for (int k = low[2]; k <= high[2]; ++k)
+      for (int j = low[1]; j <= high[1]; ++j)
+        for (int i = low[0]; i <= high[0]; ++i) store(host, index.cell(i, j, k), (end == 0 ? 1.0 : -1.0) * frame_.tangent);
+  }
+  Kokkos::deep_copy(along_walls_, host);
+}
+
+/// Stress on the walls, kPa, that of the forces included which cells beside them have on them through the kernel, and the rate at
+/// which they move past each other, 1/us.
 BloodSampler::WallShear BloodSampler::wall_shear() {
   const FluidSolver& fluid = simulation_.fluid();
   Grid& grid = simulation_.grid();
@@ -178,9 +201,9 @@ BloodSampler::WallShear BloodSampler::wall_shear() {
   }
   grid.comm().sum(sums, 4);
   const double rate = dot(velocity[1] - velocity[0], frame_.tangent) / frame_.width;
-  const double stress =
-      0.5 * (sums[0] / sums[1] - sums[2] / sums[3]);  // what drags one wall forward holds the other back
-  return {stress, rate};
+  const double of_cells = simulation_.coupling()->power_on_sides(along_walls_);
+  // What drags one wall forward holds the other back.
+  return {0.5 * (sums[0] / sums[1] - sums[2] / sums[3] + of_cells / sums[1]), rate};
 }
 
 const BloodSample& BloodSampler::sample() {
@@ -320,7 +343,7 @@ void BloodSampler::put_steady(nlohmann::json& block) const {
 nlohmann::json BloodSampler::report() const {
   nlohmann::json block;
   block["cells"] = simulation_.cells();
-  block["from_us"] = settings_.from_us;
+  block["from_us"] = began_us_;
   block["samples"] = samples();
   if (samples() == 0) return block;
   block["sampled_every_us"] = every_us_;
@@ -362,11 +385,6 @@ BloodSampler::Profile BloodSampler::profile() const {
     profile.velocity_error_mm_per_s.push_back(means_.error(speed) / units::mm_per_s);
   }
   return profile;
-}
-
-void BloodSampler::resume(const std::vector<double>& state) {
-  if (state.empty() || means_.set_state(state)) return;
-  warn("blood: what was sampled until the checkpoint is of other bins: sampling begins anew");
 }
 
 }  // namespace corpuscle

@@ -43,11 +43,13 @@ class BloodSampler {
   bool tube() const { return frame_.tube(); }
 
   /// For checkpoints, the same on all ranks.
-  std::vector<double> state() const { return means_.state(); }
-  /// What was sampled before, unless it was of other settings: then a warning, and sampling begins anew.
-  void resume(const std::vector<double>& state);
+  std::vector<double> state() const;
+  /// What was sampled before, unless it was of another flow or with other settings: then a warning, and sampling begins anew.
+  /// @param changed  keys of the case that are others than until the checkpoint, but for those of [blood]
+  void resume(const std::vector<double>& state, const std::vector<std::string>& changed);
 
  private:
+  std::vector<std::string> other_settings(const std::vector<double>& state) const;
   void make_profile();
   void measure_cells();
   void measure_flow();
@@ -56,6 +58,7 @@ class BloodSampler {
     double stress, rate;
   };
   WallShear wall_shear();
+  void mark_walls();
   /// Whether the viscosity is to be had from walls that move past each other.
   bool by_walls() const { return flow_ && flow_->sheared && frame_.guided(); }
   struct Figure {
@@ -84,8 +87,10 @@ class BloodSampler {
   HostCopy<Array<double>> cell_totals_host_;
   HostCopy<Table<double>> profile_parts_host_, edge_host_;
   std::vector<double> cell_sums_, profile_sums_;  // of all ranks
+  Components<double> along_walls_;  // [cell, 3] how the drag on each wall counts; only where walls move past each other
   BloodSample last_;
   RunningMeans means_;
+  double began_us_ = 0;  // sampling; later than asked for where a restart has begun it anew
 };
 
 }  // namespace corpuscle

@@ -107,10 +107,11 @@ Vec3 drive(const Case& scene, const FluidSolver& fluid, const Vec3& across) {
   return down;
 }
 
+Vec3 velocity_of(const Case& scene, int side) { return to_vec3(side_of(scene, side).velocity.value_or(Triple{})); }
+
 /// By how much the upper wall is faster than the lower one, along both.
 Vec3 shear_of_walls(const Case& scene, int d) {
-  const auto velocity = [&](int end) { return to_vec3(side_of(scene, 2 * d + end).velocity.value_or(Triple{})); };
-  Vec3 shear = velocity(1) - velocity(0);
+  Vec3 shear = velocity_of(scene, 2 * d + 1) - velocity_of(scene, 2 * d);
   shear[d] = 0;
   return shear;
 }
@@ -133,7 +134,9 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
   if (norm(shear) == 0 && norm(down) == 0) return std::nullopt;
   const Vec3 along = norm(shear) > 0 ? shear : down;
   frame.tangent = (1 / norm(along)) * along;
-  flow.driven = norm(down) > 0 && norm(shear) == 0;
+  // Walls that move together carry the fluid with them: its mean speed is no longer what the gradient drives.
+  const bool still = walls == 0 || (norm(velocity_of(scene, 2 * d)) == 0 && norm(velocity_of(scene, 2 * d + 1)) == 0);
+  flow.driven = norm(down) > 0 && still;
   flow.sheared = norm(shear) > 0 && norm(down) == 0;
   int axis = 0;
   for (int e = 1; e < 3; ++e)

@@ -32,7 +32,7 @@ std::string why_unguided(const Case& scene);
 double plasma_speed(const Case& scene, const GuidedFlow& flow);
 
 /// Stress of the flow on the walls around this block, resting and moving ones, into `stress` [cell, 3] of owned cells,
-/// kPa.
+/// kPa. Cells nearer to a wall than the kernel reaches act on it besides, by what is not in it.
 void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
                       const Components<double>& stress);
 

@@ -7,12 +7,14 @@
 #include <algorithm>
 
 #include "core/error.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
 namespace {
 
-// Columns of the table of cells.
+// Columns of the table of cells. The type is one of those of the case that wrote them: a restart may make types differ that
+// were equal, and has its own from its case.
 enum Column { type, lap_i, lap_j, lap_k, rank, first_vertex, first_triangle, columns };
 
 const char* const table_name = "cells";
@@ -53,6 +55,24 @@ void write_cells(CheckpointWriter& file, const Comm& comm, const SharedCells& ce
   file.add(numbers_name, {2}, numbers);
 }
 
+namespace {
+
+/// What the case says of the cells in this rank's share of the file, which other ranks may have. @returns in their order
+std::vector<CellRecord> records_of_share(const Comm& comm, const SharedCells& cells) {
+  Parcels parcels;
+  for (const CellRecord& cell : cells.own()) {
+    const std::int64_t after = cell.number + 1;
+    put(parcels[static_cast<int>((after * comm.size() - 1) / cells.total())], &cell, 1);
+  }
+  std::vector<CellRecord> records;
+  for (const auto& [rank, bytes] : exchange_parcels(comm, parcels))
+    for (std::size_t n = 0; n < bytes.size();) n = take(bytes, n, &records.emplace_back(), 1);
+  std::sort(records.begin(), records.end(), [](const CellRecord& a, const CellRecord& b) { return a.number < b.number; });
+  return records;
+}
+
+}  // namespace
+
 void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cells) {
   std::int64_t numbers[2];
   file.read(numbers_name, {2}, numbers);
@@ -61,9 +81,10 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
   const Shape stored = file.shape(carried_name);
   const hsize_t columns_stored = stored.size() == 2 ? stored[1] : width;
   const hsize_t first = total * comm.rank() / comm.size(), last = total * (comm.rank() + 1) / comm.size();
-  std::vector<CellRecord> records;
+  std::vector<CellRecord> records = records_of_share(comm, cells);
   std::vector<int> owners;
   std::vector<double> carried;
+  std::string wrong;
   const Shape table_shape{total, columns}, carried_shape{static_cast<hsize_t>(cells.total_vertices()), columns_stored};
   if (last > first) {
     std::vector<std::int64_t> table((last - first) * columns);
@@ -71,11 +92,10 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
     hsize_t vertices = 0;
     for (hsize_t c = first; c < last; ++c) {
       const std::int64_t* row = table.data() + (c - first) * columns;
-      if (row[type] < 0 || row[type] >= static_cast<std::int64_t>(cells.membranes().types().size()))
-        throw InputError(fmt::format("cells.{}: the checkpoint has a cell of a type that the case does not have", c));
-      CellRecord cell{static_cast<int>(row[type]), static_cast<int>(c), {}, row[first_vertex], row[first_triangle]};
+      CellRecord& cell = records[c - first];
+      if (row[first_vertex] != cell.first_vertex || row[first_triangle] != cell.first_triangle)
+        wrong = fmt::format("cells.{}: the checkpoint has it with a mesh of another size than the case", c);
       for (int d = 0; d < 3; ++d) cell.laps[d] = static_cast<int>(row[lap_i + d]);
-      records.push_back(cell);
       if (numbers[1] == comm.size()) owners.push_back(static_cast<int>(row[rank]));
       vertices += cells.membranes().types()[cell.type].mesh.vertices.size();
     }
@@ -86,6 +106,8 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
     for (hsize_t v = 0; v < vertices; ++v)
       for (hsize_t c = 0; c < std::min(width, columns_stored); ++c) carried[v * width + c] = rows[v * columns_stored + c];
   }
+  wrong = agree(comm, wrong);
+  if (!wrong.empty()) throw InputError(wrong);
   cells.restore(records, carried, owners, static_cast<long>(numbers[0]));
 }
 

@@ -8,21 +8,29 @@
 
 namespace corpuscle {
 
-std::vector<std::array<int, 3>> period_turns(const Grid& grid) {
+std::vector<std::array<int, 3>> period_turns(const Grid& grid, int most) {
   const IndexSpace& index = grid.index();
   std::vector<std::array<int, 3>> turns;
-  for (int k = 0; k < 27; ++k) {
-    const std::array<int, 3> step{(k % 3 + 1) % 3 - 1, (k / 3 % 3 + 1) % 3 - 1, (k / 9 + 1) % 3 - 1};
-    bool allowed = true;
-    for (int d = 0; d < 3; ++d) allowed = allowed && (step[d] == 0 || index.periodic[d]);
-    if (allowed) turns.push_back(step);
+  for (int far = 1; far <= most; ++far) {
+    const int width = 2 * far + 1;
+    for (int k = 0; k < width * width * width; ++k) {
+      const std::array<int, 3> step{(k % width + far) % width - far, (k / width % width + far) % width - far,
+                                    (k / width / width + far) % width - far};
+      int furthest = 0;
+      bool allowed = true;
+      for (int d = 0; d < 3; ++d) {
+        allowed = allowed && (step[d] == 0 || index.periodic[d]);
+        furthest = std::max(furthest, std::abs(step[d]));
+      }
+      if (allowed && (furthest == far || (k == 0 && far == 1))) turns.push_back(step);
+    }
   }
   return turns;
 }
 
-std::vector<Vec3> period_shifts(const Grid& grid) {
+std::vector<Vec3> period_shifts(const Grid& grid, int most) {
   std::vector<Vec3> shifts;
-  for (const auto& turns : period_turns(grid)) {
+  for (const auto& turns : period_turns(grid, most)) {
     Vec3 shift;
     for (int d = 0; d < 3; ++d)
       for (int m = 0; m < 3; ++m) shift[m] += turns[d] * grid.period(d)[m];
@@ -62,6 +70,7 @@ RankBlocks::RankBlocks(const Grid& grid, int layers) : frame_(periodic_frame(gri
   for (int r = 0; r < ranks; ++r) {
     const double* one = all.data() + static_cast<std::size_t>(numbers) * r;
     around_.push_back({{one[0], one[1], one[2]}, {one[3], one[4], one[5]}});
+    whole_ = r == 0 ? around_[r] : joined(whole_, around_[r]);
     for (int s = 0; s < samples; ++s) samples_.push_back({one[6 + 3 * s], one[7 + 3 * s], one[8 + 3 * s]});
   }
 }

@@ -1,11 +1,16 @@
 #include "cells/shared_cells.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include "cells/cell_boxes.hpp"
+#include "core/error.hpp"
 #include "coupling/periodic_frame.hpp"
+#include "immersed/surface.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
@@ -14,6 +19,11 @@ namespace {
 /// Every how many steps cells may come back through sides or change their rank. When they do must not depend on when copies
 /// were made, or a restart would not go on with the same bits.
 constexpr long review_every = 16;
+
+/// Those that are further beyond a side than this share of the period come back at once, or they would be needed under more images
+/// than these: as many periods each way.
+constexpr double far_share = 0.125;
+constexpr int most_turns = 2;
 
 /// Of a copy, as its rank is told of it.
 struct Notice {
@@ -37,8 +47,8 @@ SharedCells::SharedCells(const CellPlaces& places, const Grid& grid, int layers,
                          std::shared_ptr<Workspace> workspace)
     : comm_(grid.comm()),
       blocks_(grid, layers),
-      shift_turns_(period_turns(grid)),
-      shifts_(period_shifts(grid)),
+      shift_turns_(period_turns(grid, most_turns)),
+      shifts_(period_shifts(grid, most_turns)),
       frame_(periodic_frame(grid)),
       skin_(grid.mean_spacing()),
       contact_(contact_um) {
@@ -72,7 +82,15 @@ void SharedCells::start(const CellPlaces& places) {
     }
   }
   total_ = static_cast<int>(places.cells.size());
-  restore(mine, carried, {}, 0);
+  own_ = mine;
+  set_own(carried);
+  measure(0);
+  Kokkos::deep_copy(boxes_host_, boxes_);
+  if (wrap(0)) {  // a case may have cells anywhere beyond its periodic sides
+    measure(0);
+    Kokkos::deep_copy(boxes_host_, boxes_);
+  }
+  settle(owners());
 }
 
 Triple SharedCells::wrapped_by(const CellRecord& cell) const {
@@ -95,17 +113,18 @@ void SharedCells::measure(double ahead_us) {
 bool SharedCells::begin_step(double ahead_us) {
   const bool review = steps_++ % review_every == 0;
   measure(ahead_us);
+  const Departures departures =
+      find_departures(static_cast<int>(own_.size()), boxes_, before_, skin_, frame_, far_share);
   bool moved = false;
-  if (review) {
+  if (review || departures.mean) {
     Kokkos::deep_copy(boxes_host_, boxes_);
-    moved = wrap();
+    moved = wrap(review ? 0 : far_share);
     if (moved) measure(ahead_us);
     Kokkos::deep_copy(boxes_host_, boxes_);
   }
   const std::vector<int> owner = review ? owners() : std::vector<int>();
   const bool leaving = std::any_of(owner.begin(), owner.end(), [this](int rank) { return rank != comm_.rank(); });
-  const bool left = boxes_left(static_cast<int>(own_.size()), boxes_, before_, skin_);
-  double change[2] = {leaving ? 1.0 : 0.0, moved || left ? 1.0 : 0.0};
+  double change[2] = {leaving ? 1.0 : 0.0, moved || departures.box ? 1.0 : 0.0};
   comm_.max(change, 2);
   if (change[0] + change[1] == 0) return false;
   if (change[0] > 0) distribute(owner);
@@ -114,18 +133,18 @@ bool SharedCells::begin_step(double ahead_us) {
   return true;
 }
 
-/// Own cells whose vertices' mean lies outside the domain come back at its other end. After measure(), with boxes_host_.
-bool SharedCells::wrap() {
+/// Own cells whose vertices' mean lies outside the domain, by a share of the period, come back at its other end. After measure(),
+/// with boxes_host_.
+bool SharedCells::wrap(double share) {
   bool any = false;
   std::vector<Vec3> by(own_.size());
   for (std::size_t c = 0; c < own_.size(); ++c) {
-    const Vec3 from_origin = Vec3{boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1),
-                                  boxes_host_(c, BoxColumn::mean + 2)} -
-                             frame_.origin;
+    const Vec3 mean{boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1), boxes_host_(c, BoxColumn::mean + 2)};
     for (int d = 0; d < 3; ++d) {
       if (!frame_.periodic[d]) continue;
-      const double turns = std::floor(dot(from_origin, frame_.dual[d]));
-      if (turns == 0 || !std::isfinite(turns)) continue;
+      const double along = periods_from_origin(frame_, mean, d), turns = std::floor(along);
+      const bool within = along >= -share && along < 1 + share;
+      if (within || !std::isfinite(turns)) continue;
       any = true;
       own_[c].laps[d] += static_cast<int>(turns);
       by[c] += turns * frame_.period[d];
@@ -169,8 +188,13 @@ void SharedCells::restore(const std::vector<CellRecord>& cells, const std::vecto
   set_own(carried);
   measure(0);
   Kokkos::deep_copy(boxes_host_, boxes_);
-  distribute(owners.empty() ? this->owners() : owners);
   steps_ = steps;
+  settle(owners.empty() ? this->owners() : owners);
+}
+
+/// Cells at hand go to their ranks for the first time.
+void SharedCells::settle(const std::vector<int>& owners) {
+  distribute(owners);
   measure(0);
   renew_copies();
 }
@@ -249,18 +273,45 @@ std::vector<SpaceBox> SharedCells::find_reach() const {
   return reach;
 }
 
+/// Of a cell that would be seen under images beyond those that there are. @param around  all places where anything looks for it
+std::string SharedCells::unseen_images(const SpaceBox& around, int cell) const {
+  const SpaceBox box = box_of(boxes_host_, cell, skin_ + contact_);
+  constexpr double next = most_turns + 1;
+  for (int d = 0; d < 3; ++d) {
+    if (!frame_.periodic[d]) continue;
+    double apart = 0, half = 0;  // periods, of the boxes' middles, and half their lengths together
+    for (int m = 0; m < 3; ++m) {
+      apart += 0.5 * frame_.dual[d][m] * (box.lower[m] + box.upper[m] - around.lower[m] - around.upper[m]);
+      half += 0.5 * std::abs(frame_.dual[d][m]) * (box.upper[m] - box.lower[m] + around.upper[m] - around.lower[m]);
+    }
+    if (next - std::abs(apart) <= half)
+      return fmt::format("{} reaches over too many periods of the grid along {}, of {:.3g} um: it meets more than {} images of itself "
+                         "each way. Likely cause: a step too long for the flow, or a grid too short: reduce time.step_us or lengthen "
+                         "the grid",
+                         body_name(surfaces(), cell), "ijk"[d], norm(frame_.period[d]), most_turns);
+  }
+  return "";
+}
+
 /// After measure().
 void SharedCells::renew_copies() {
   ++renewals_;
   Kokkos::deep_copy(boxes_host_, boxes_);
   Kokkos::deep_copy(before_, boxes_);
   const std::vector<SpaceBox> reach = find_reach();
+  SpaceBox around = blocks_.whole();
+  for (const SpaceBox& one : reach) around = joined(around, one);
+  std::string unseen;
+  for (std::size_t c = 0; c < own_.size() && unseen.empty(); ++c) unseen = unseen_images(around, static_cast<int>(c));
+  unseen = agree(comm_, unseen);
+  if (!unseen.empty()) throw ComputationError(unseen);
   std::map<int, std::vector<CopyMessages::Copy>> wanted;
   Parcels notices;
   for (std::size_t c = 0; c < own_.size(); ++c) {
     const SpaceBox box = box_of(boxes_host_, static_cast<int>(c), skin_ + contact_);
     for (std::size_t image = 0; image < shifts_.size(); ++image) {
       const SpaceBox seen{box.lower + shifts_[image], box.upper + shifts_[image]};
+      if (!overlap(seen, around)) continue;
       for (int rank = 0; rank < blocks_.ranks(); ++rank) {
         if (image == 0 && rank == comm_.rank()) continue;
         if (!blocks_.reaches(seen, rank) && !(contact_ > 0 && overlap(seen, reach[rank]))) continue;

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "cells/cell_places.hpp"
 #include "cells/copy_messages.hpp"
@@ -27,7 +28,8 @@ class SharedCells {
   /// Every rank calls, with all cells.
   /// @param layers      cells around a rank's own in which it must know of surfaces
   /// @param contact_um  a rank has copies of cells that are so near to its own; 0: only those that reach into its block
-  /// @throws InputError  as Membranes
+  /// @throws InputError        as Membranes
+  /// @throws ComputationError  as begin_step()
   SharedCells(const CellPlaces& places, const Grid& grid, int layers, double contact_um,
               std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
@@ -49,6 +51,7 @@ class SharedCells {
   /// Before a step that may look at positions up to `ahead_us` on: cells that have left the domain come back at its other
   /// end, or go to other ranks, and the copies are those that the step needs. Every rank calls.
   /// @returns whether vertices are others than before
+  /// @throws ComputationError  for a cell that reaches over so many periods that it is not known under all its images
   bool begin_step(double ahead_us);
   /// Values of a field [vertex, 3] from the own cells to all copies; positions are shifted.
   void to_copies(const Components<double>& field, bool positions = false);
@@ -75,12 +78,14 @@ class SharedCells {
   int vertices_of(int type) const { return static_cast<int>(membranes_->types()[type].mesh.vertices.size()); }
   int triangles_of(int type) const { return static_cast<int>(membranes_->types()[type].mesh.triangles.size()); }
   void measure(double ahead_us);
-  bool wrap();
+  bool wrap(double share);
+  void settle(const std::vector<int>& owners);
   void distribute(const std::vector<int>& owners);
   void set_own(const std::vector<double>& carried);
   void renew_copies();
   void note_turns(const std::vector<CopyMessages::Copy>& received);
   std::vector<SpaceBox> find_reach() const;
+  std::string unseen_images(const SpaceBox& around, int cell) const;
   std::vector<int> owners() const;
 
   Comm comm_;

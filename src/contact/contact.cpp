@@ -154,7 +154,7 @@ void Contact::make_lists(double way, double dt) {
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
   make_bins(std::max(with_skin.other, with_skin.own));
   const ContactSearch search{surface_, images_, bins_, rest_, with_skin};
-  lists_.items = count_items(search, lists_);
+  lists_.items = countable_items(count_items(search, lists_));
   if (lists_.items > item_room_) {
     item_room_ = lists_.items + lists_.items / 4;
     lists_.item = make<Array<int>>("items", item_room_);

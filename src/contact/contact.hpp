@@ -2,6 +2,7 @@
 // and undone.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -21,6 +22,9 @@ struct ContactPeers {
   Comm comm;
   std::function<void()> update_copies;  // positions of this rank's cells to all their copies
 };
+
+/// Of the lists' entries on a rank. @throws ComputationError  for more than an int counts
+int countable_items(std::int64_t items);
 
 struct GapGoal;
 struct LongestWay;

@@ -23,6 +23,15 @@ auto host_of(const View& view) {
 
 }  // namespace
 
+int countable_items(std::int64_t items) {
+  constexpr std::int64_t most = 2147483647;
+  if (items > most)
+    throw ComputationError(fmt::format("contact: {:.3g} pairs of a vertex and a triangle on a rank, and {:.3g} are the most: use more "
+                                       "ranks, fewer cells, or a smaller contact.range_um",
+                                       static_cast<double>(items), static_cast<double>(most)));
+  return static_cast<int>(items);
+}
+
 /// Before lists are made: they reach as far as anything may come from, and would take in all of a scene that flies apart.
 /// @returns um, from the present lists to the end of the next step
 /// @throws ComputationError

@@ -1,7 +1,11 @@
 #include "coupling/cell_loads.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "core/error.hpp"
+#include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
 
 namespace corpuscle {
@@ -33,10 +37,31 @@ CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& tran
     const ContactPeers peers{comm_, [&cells] { cells.to_copies(cells.surfaces().x, true); }};
     contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
     walls_ = walls_of(scene);
+    refuse_thin_blocks(scene.contact->range_um);
   }
   for (std::size_t c = 0; c < scene.cells.size(); ++c)
     if (pushed(scene.cells[c])) push_[static_cast<int>(c)] = scene.cells[c].push_nN;
   take_up();
+}
+
+/// A rank knows the walls of its own block alone.
+/// @throws InputError  where some are within reach of the next block
+void CellLoads::refuse_thin_blocks(double range) const {
+  const Lattice& lattice = transfer_.block().lattice;
+  std::string wrong;
+  for (int d = 0; d < 3; ++d)
+    for (int end = 0; end < 2; ++end) {
+      const bool here = end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d];
+      const bool ends_too = end == 0 ? lattice.boundary_above[d] : lattice.boundary_below[d];
+      if (!walls_.wall[d][end] || !here || ends_too) continue;
+      const double thickness = least_thickness(lattice, d, end);
+      if (thickness < range)
+        wrong = fmt::format("contact.range_um = {:g}: the block of rank {} beside a wall is only {:.3g} um thick along {}, and the next "
+                            "one would not feel the wall: use fewer ranks, or a smaller contact.range_um",
+                            range, comm_.rank(), thickness, "ijk"[d]);
+    }
+  wrong = agree(comm_, wrong);
+  if (!wrong.empty()) throw InputError(wrong);
 }
 
 void CellLoads::take_up() {

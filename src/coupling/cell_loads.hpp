@@ -14,6 +14,7 @@ namespace corpuscle {
 class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
+  /// @throws InputError  where walls act beyond the blocks beside them
   CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
@@ -44,12 +45,15 @@ class CellLoads {
   double power_of_pushes() const;
   /// fJ, of the contacts between cells as look() saw them and with walls at present. After Transfer::place(), or a move since then.
   double contact_energy(double dt_us) const;
+  /// um, where the repulsion of steps of that length goes on as its tangent; 0 without contact.
+  double knee_um(double dt_us) const { return contact_ ? contact_->law(dt_us).knee : 0; }
   double fastest_relaxation_per_us() const { return contact_ ? contact_->fastest_relaxation_per_us() : 0; }
   std::optional<ContactReport> report() const;
   void resume(const ContactReport& report);
 
  private:
   void add_walls(double dt_us);
+  void refuse_thin_blocks(double range_um) const;
   /// @param reach_um  to which walls are looked for
   WallContacts at_walls(double reach_um) const;
 

@@ -101,6 +101,8 @@ class Coupling {
   virtual ImmersedFlow* immersed() { return nullptr; }
   /// Of cells on sides that move, past the fluid, nW: what spreads their forces reaches a side beside them.
   virtual double power_on_sides() { return 0; }
+  /// The same with other velocities of the sides. @param of_sides  [cell, 3], read on the sides of the block
+  virtual double power_on_sides(const Components<double>&) { return 0; }
 };
 
 /// A speed that no cell tells from rest, um/us: shear modulus over viscosity is that with which a deformed cell returns to

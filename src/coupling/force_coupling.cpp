@@ -284,7 +284,9 @@ std::string ForceCoupling::stability_text(double dt) const {
 }
 
 std::map<std::string, double> ForceCoupling::report(double dt) const {
-  return {{"largest_stable_step_us", stable_us_}, {"margin", stable_us_ / dt}};
+  std::map<std::string, double> figures{{"largest_stable_step_us", stable_us_}, {"margin", stable_us_ / dt}};
+  if (contact_report()) figures["contact_linear_below_um"] = loads_->knee_um(dt);
+  return figures;
 }
 
 /// How far the fluid gets in two steps at the fastest that it has been: a cell that is nearer may leave the grid before it is
@@ -460,8 +462,12 @@ double ForceCoupling::unresolved_dissipation() {
 double ForceCoupling::power_on_sides() {
   const auto moves = [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::moving_wall; };
   if (std::none_of(scene_.boundaries.begin(), scene_.boundaries.end(), moves)) return 0;
+  return power_on_sides(fluid_.velocity());
+}
+
+double ForceCoupling::power_on_sides(const Components<double>& of_sides) {
   const Components<double> room(uninitialised("corpuscle::coupling::beside_sides"), surfaces().vertices, 3);
-  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), fluid_.velocity(), room));
+  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), of_sides, room));
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {

@@ -31,6 +31,7 @@ class ForceCoupling : public Coupling {
   double power_on_cells() override;
   double unresolved_dissipation() override;
   double power_on_sides() override;
+  double power_on_sides(const Components<double>& of_sides) override;
   double power_of_pushes() override { return loads_ ? loads_->power_of_pushes() : 0; }
   double contact_energy(double dt_us) override { return loads_ ? loads_->contact_energy(dt_us) : 0; }
   std::optional<ContactReport> contact_report() const override { return loads_ ? loads_->report() : std::nullopt; }

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "contact/contact_lists.hpp"
 #include "core/error.hpp"
 #include "immersed/triangle.hpp"
 #include "membrane/reference.hpp"
@@ -221,6 +222,15 @@ TEST_CASE("lists find what looking at every triangle finds", "[contact]") {
     contact.look(0, dt);
   }
   CHECK(contact.report().crossings == 0);
+}
+
+TEST_CASE("more pairs than an int counts are refused by name", "[contact]") {
+  const Array<int> numbers("corpuscle::test::numbers", 3);
+  Kokkos::deep_copy(numbers, 1600000000);
+  const std::int64_t items = numbers_to_starts("corpuscle::test::starts", numbers, 2);
+  CHECK(items == 3200000000);
+  CHECK_THROWS_WITH(countable_items(items), Catch::Contains("3.2e+09 pairs") && Catch::Contains("contact.range_um"));
+  CHECK(countable_items(2147483647) == 2147483647);
 }
 
 TEST_CASE("lists are kept while nothing has come through the skin", "[contact]") {

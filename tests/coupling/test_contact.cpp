@@ -264,12 +264,77 @@ TEST_CASE("pressed cells on several ranks move as on one", "[coupling][contact][
   scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-12;
   for (int side : {2, 3}) scene.boundaries[side].type = Type::wall;
   for (auto& cell : scene.cells) cell.center_um[1] = 1.95;  // near a wall as well
+  for (auto& cell : scene.cells) cell.membrane_viscosity_N_s_per_m = 1e-8;
+  scene.boundaries[3].type = Type::moving_wall;
+  scene.boundaries[3].velocity = Triple{1e-3, 0, 0};
   Timers timers;
   FlowSimulation alone(Comm(MPI_COMM_SELF), scene, timers), shared(Comm(), scene, timers);
-  while (!alone.done()) alone.step(), shared.step();
-  CHECK(alone.coupling()->contact_report()->smallest_gap < 0.25);
+  EnergyBalance of_one(alone), of_all(shared);
+  const auto sample = [&] { of_one.sample(0), of_all.sample(0); };
+  sample();
+  while (!alone.done()) alone.step(), shared.step(), sample();
+  const ContactReport one = *alone.coupling()->contact_report(), all = *shared.coupling()->contact_report();
+  CHECK(one.smallest_gap < 0.25);
   CHECK(alone.coupling()->contact_energy(20) > 0);
   CHECK(largest_difference(positions(alone), positions(shared)) <
         1e-9);  // um: round-off, and the solvers' last residuals
+  // Every rank has the figures of all.
+  CHECK(all.smallest_gap == Approx(one.smallest_gap).margin(1e-8));
+  CHECK(all.smallest_wall_gap == Approx(one.smallest_wall_gap).margin(1e-8));
+  CHECK(one.smallest_wall_gap < 1);
+  const EnergyTotals &a = of_one.totals(), &b = of_all.totals();
+  for (auto term : {&EnergyTotals::boundaries, &EnergyTotals::dissipation, &EnergyTotals::on_cells, &EnergyTotals::pushed,
+                    &EnergyTotals::contact, &EnergyTotals::membrane_dissipation}) {
+    CHECK(a.*term != 0);
+    CHECK(b.*term == Approx(a.*term).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("copies reach as far as attraction does", "[coupling][contact][ranks]") {
+  if (Comm().size() == 1) return;
+  const auto copies = [](double range) {
+    Case scene = pressed_cells(0.6, 0, 20, 20, 0.75);
+    scene.contact->aggregation_energy = 1e-5;
+    scene.contact->aggregation_range_um = range;
+    Timers timers;
+    FlowSimulation simulation(Comm(), scene, timers);
+    return Comm().sum(static_cast<double>(simulation.shared_cells()->copies()));
+  };
+  CHECK(copies(3.9) > copies(0.5));
+}
+#endif
+
+TEST_CASE("attraction that a step could not follow is refused", "[coupling][contact]") {
+  Case scene = pressed_cells(0.6, 0, 20, 20, 0.75);
+  scene.contact->aggregation_energy = 1;
+  scene.contact->aggregation_range_um = 0.5;
+  Timers timers;
+  CHECK_THROWS_WITH([&] { FlowSimulation simulation(Comm(), scene, timers); }(), Catch::Contains("time.step_us"));
+}
+
+#ifdef CORPUSCLE_MPI
+TEST_CASE("a wall that reaches beyond the block beside it is refused", "[coupling][contact][ranks]") {
+  // 16 spacings from wall to wall and 6 along the others: ranks divide the former.
+  Case scene = pressed_cells(0.6, 0, 10, 10);
+  scene.grid->nodes = {7, 7, 17};
+  scene.grid->lower_um = {0, 0, 0}, scene.grid->upper_um = {1.5, 1.5, 4};
+  for (int side : {4, 5}) scene.boundaries[side].type = Type::wall;
+  scene.cells.resize(1);
+  CellSettings& cell = scene.cells[0];
+  cell.shape = CellSettings::Shape::sphere;
+  cell.radius_um = 0.5;
+  cell.vertices = 60;
+  cell.law = CellSettings::Law::neo_hookean;
+  cell.area_modulus_uN_per_m = cell.local_area_modulus_uN_per_m = 0;
+  cell.shear_modulus_uN_per_m = 1;
+  cell.center_um = {0.75, 0.75, 2};
+  scene.contact->range_um = 0.6;
+  const double thickness = 4.0 / Comm().size();
+  Timers timers;
+  CHECK_NOTHROW(FlowSimulation(Comm(), scene, timers));
+  scene.contact->range_um = 1.1 * thickness;
+  if (Comm().size() > 1 && thickness < 1.5)
+    CHECK_THROWS_WITH([&] { FlowSimulation simulation(Comm(), scene, timers); }(),
+                      Catch::Contains("contact.range_um") && Catch::Contains("fewer ranks"));
 }
 #endif
