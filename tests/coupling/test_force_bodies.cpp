@@ -314,3 +314,20 @@ TEST_CASE("beside a body cells have the flow's velocity, and that of the body wh
     CHECK(std::abs(off) < (gap == 0 ? 0.12 : 0.04));
   }
 }
+
+TEST_CASE("a body that runs a cell over stops the run", "[coupling][force][bodies][contact]") {
+  // 0.4 um a step, further than contact reaches.
+  Case scene = pushed_onto_a_ball(0, 400);
+  scene.cells[0].center_um = {-5.5, 0, 0};
+  scene.bodies[0].velocity_um_per_us = {-2e-2, 0, 0};
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  std::string text;
+  try {
+    while (!simulation.done()) simulation.step();
+  } catch (const ComputationError& error) {
+    text = error.what();
+  }
+  INFO(text);
+  for (const char* part : {"cells.0", "bodies.0", "time.step_us"}) CHECK(text.find(part) != std::string::npos);
+}
