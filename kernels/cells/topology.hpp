@@ -6,15 +6,15 @@
 
 namespace corpuscle {
 
-/// Fills the numbering of vertices and triangles of every body of `set`, whose first_vertex and first_triangle are given.
-/// @param types  its bodies are the types
+/// Fills the numbering of vertices and triangles of the bodies first <= body < last of `set`, whose first_vertex and first_triangle are
+/// given. @param types  its bodies are the types
 /// @param type   [body] of set
-inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set) {
+inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last) {
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const SurfaceSet from = types, to = set;
   Kokkos::parallel_for(
-      "corpuscle::cells::fill_topology", Kokkos::TeamPolicy<Exec>(set.bodies, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
-        const int body = team.league_rank(), v0 = to.first_vertex(body), t0 = to.first_triangle(body);
+      "corpuscle::cells::fill_topology", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
+        const int body = first + team.league_rank(), v0 = to.first_vertex(body), t0 = to.first_triangle(body);
         const int from_v0 = from.first_vertex(type(body)), from_t0 = from.first_triangle(type(body));
         const int vertices = to.first_vertex(body + 1) - v0, triangles = to.first_triangle(body + 1) - t0;
         Kokkos::parallel_for(Kokkos::TeamThreadRange(team, vertices), [&](int i) {
@@ -36,12 +36,12 @@ inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const
       });
 }
 
-/// x [vertex, 3] and area [vertex] of the templates, for every body of `set`, each in a place of its own.
-inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, const Components<double>& x,
-                      const Array<double>& area) {
+/// x [vertex, 3] and area [vertex] of the templates, for the vertices first <= i < last of `set`, each in a place of its own.
+inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last,
+                      const Components<double>& x, const Array<double>& area) {
   const SurfaceSet from = types, to = set;
   Kokkos::parallel_for(
-      "corpuscle::cells::fill_rest", Policy(0, set.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::cells::fill_rest", Policy(first, last), KOKKOS_LAMBDA(int i) {
         const int body = to.vertex_body(i), v = from.first_vertex(type(body)) + i - to.first_vertex(body);
         for (int d = 0; d < 3; ++d) x(i, d) = from.x(v, d);
         area(i) = from.area(v);

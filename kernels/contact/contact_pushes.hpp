@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/counting_sort.hpp"
+#include "common/sums.hpp"
 #include "contact/contact_law.hpp"
 #include "contact/contact_views.hpp"
 
@@ -53,9 +54,9 @@ inline void contact_forces(const SurfaceSet& surface, const ContactLaw& contact_
       });
 }
 
-/// Energy of the contacts of the first `vertices`, fJ.
+/// Energy of the contacts that count, fJ.
 inline double contact_energy(const SurfaceSet& surface, const ContactLaw& contact_law, const ContactRest& at_rest,
-                             const ContactLists& lists, const ContactViews& contacts, int vertices) {
+                             const ContactLists& lists, const ContactViews& contacts, int own) {
   const SurfaceSet s = surface;
   const ContactLaw law = contact_law;
   const auto area = at_rest.area;
@@ -63,13 +64,52 @@ inline double contact_energy(const SurfaceSet& surface, const ContactLaw& contac
   const ContactViews c = contacts;
   double energy = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::energy", Policy(0, vertices),
+      "corpuscle::contact::energy", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, double& sum) {
         for (int g = first(v); g < first(v + 1); ++g)
-          if (c.item(g) >= 0) sum += 0.5 * area(v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
+          if (c.item(g) >= 0 && counts(s, v, c.item(g), own)) sum += 0.5 * area(v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
       },
       energy);
   return energy;
+}
+
+struct RigidNumber {
+  SurfaceSet surface;
+  int number;
+  KOKKOS_INLINE_FUNCTION bool operator()(int body) const { return body >= surface.cells && surface.number(body) == number; }
+};
+
+/// Force of the contacts that count on a rigid body and all its images, nN, and its power, nW.
+inline Sums<4> contact_load_on_rigid(const SurfaceSet& surface, const ContactLaw& contact_law, const ContactRest& at_rest,
+                                     const ContactLists& lists, const ContactViews& contacts, int own, int rigid_body) {
+  const SurfaceSet s = surface;
+  const ContactLaw law = contact_law;
+  const auto area = at_rest.area;
+  const auto first = lists.first_group;
+  const ContactViews c = contacts;
+  const RigidNumber is{s, rigid_body};
+  Sums<4> load_on_body;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::load_on_rigid", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, Sums<4>& sum) {
+        for (int g = first(v); g < first(v + 1); ++g) {
+          if (c.item(g) < 0 || !counts(s, v, c.item(g), own)) continue;
+          const int t = item_triangle(s, c.item(g));
+          const bool vertex = is(s.vertex_body(v));
+          if (!vertex && !is(s.triangle_body(t))) continue;
+          const double push = (vertex ? 0.5 : -0.5) * area(v) * law.total_pressure(c.gap(g), true);
+          Vec3 velocity = load(s.v, v);
+          if (!vertex) {
+            velocity = {};
+            for (int k = 0; k < 3; ++k) velocity += c.weight(g, k) * load(s.v, s.triangle(t, k));
+          }
+          const Vec3 force = push * load(c.normal, g);
+          for (int d = 0; d < 3; ++d) sum[d] += force[d];
+          sum[3] += dot(force, velocity);
+        }
+      },
+      load_on_body);
+  return load_on_body;
 }
 
 }  // namespace corpuscle

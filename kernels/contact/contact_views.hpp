@@ -46,6 +46,11 @@ KOKKOS_INLINE_FUNCTION int item_image(const SurfaceSet& s, int item) { return it
 KOKKOS_INLINE_FUNCTION bool same_body(const SurfaceSet& s, int vertex, int item) {
   return item_image(s, item) == 0 && s.vertex_body(vertex) == s.triangle_body(item_triangle(s, item));
 }
+/// Whether a contact counts where a rank's own are the first `own` vertices: those do, and of rigid bodies, which all ranks have, those
+/// that meet them.
+KOKKOS_INLINE_FUNCTION bool counts(const SurfaceSet& s, int vertex, int item, int own) {
+  return vertex < own || (s.vertex_body(vertex) >= s.cells && s.triangle(item_triangle(s, item), 0) < own);
+}
 KOKKOS_INLINE_FUNCTION bool same_group(const SurfaceSet& s, int item, int other) {
   return item_image(s, item) == item_image(s, other) &&
          s.triangle_body(item_triangle(s, item)) == s.triangle_body(item_triangle(s, other));

@@ -124,6 +124,25 @@ inline double least_own_gap(const SurfaceSet& surface, const ContactLists& lists
   return least;
 }
 
+/// um between membranes and rigid bodies, or else between membranes, of all vertices; 1e30 where nothing is within reach.
+inline double least_gap_to(bool rigid, const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts) {
+  const SurfaceSet s = surface;
+  const ContactLists in = lists;
+  const ContactViews c = contacts;
+  double least = 1e30;
+  Kokkos::parallel_reduce(
+      "corpuscle::contact::least_gap_to", Policy(0, s.vertices),
+      KOKKOS_LAMBDA(int v, double& sum) {
+        for (int g = in.first_group(v); g < in.first_group(v + 1); ++g) {
+          if (c.item(g) < 0 || same_body(s, v, c.item(g))) continue;
+          const bool of_rigid = s.vertex_body(v) >= s.cells || s.triangle_body(item_triangle(s, c.item(g))) >= s.cells;
+          if (of_rigid == rigid) sum = smaller(sum, c.gap(g));
+        }
+      },
+      Smallest(least));
+  return least;
+}
+
 inline double least_of(const Array<double>& gap) {
   double least = 1e30;
   Kokkos::parallel_reduce(

@@ -33,7 +33,7 @@ struct Shortfall : Joined<Shortfall> {
 
 /// push: the way by which vertex and corners must move for the gap, along the normal as it was found, to be at least
 /// the goal.
-/// @param counted  of the first so many vertices contacts count
+/// @param counted  this rank's own vertices, whose contacts count
 inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
                                  const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted) {
   const SurfaceSet s = surface;
@@ -60,8 +60,9 @@ inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_
           c.push(g) = goal.relax * (wanted - now) / mobility;
           Shortfall own;
           own.most = (wanted - now) / wanted;
-          if (v < counted) own.limited = 1;
-          if (v < counted && now < 0) own.through = 1, own.first = g;
+          const bool counting = counts(s, v, c.item(g), counted);
+          if (counting) own.limited = 1;
+          if (counting && now < 0) own.through = 1, own.first = g;
           sum += own;
         }
       },
@@ -94,7 +95,7 @@ struct CrossingCount : Joined<CrossingCount> {
 /// the same place when it was last looked at; those are turned round, so that their gap is negative as well.
 /// @param side  [vertex] on which it saw its own body last, kept from call to call: triangle * 2 + 1 outside, triangle * 2 inside;
 ///              -1 where nothing was within reach
-/// @param counted  of the first so many vertices crossings count
+/// @param counted  this rank's own vertices, whose crossings count
 inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
                                     const Array<int>& side, int counted) {
   const SurfaceSet s = surface;
@@ -119,7 +120,7 @@ inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactList
               for (int d = 0; d < 3; ++d) c.normal(g, d) = -c.normal(g, d);
             }
           }
-          if (c.gap(g) < 0 && v < counted) {
+          if (c.gap(g) < 0 && counts(s, v, c.item(g), counted)) {
             CrossingCount own;
             own.vertices = 1;
             own.first = g;

@@ -79,19 +79,20 @@ inline StepWays step_ways(const SurfaceSet& surface, const Components<double>& l
   return ways;
 }
 
-/// The longest way towards or away from a triangle in its list that one of the first `vertices` makes in a step, if it is longer than
-/// `least` and than their distance: it comes from the other side, or is about to go there.
-inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int vertices,
+/// The longest way towards or away from a triangle in its list that a vertex makes in a step, if it is longer than `least` and than
+/// their distance: it comes from the other side, or is about to go there. Of the contacts that count.
+inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int own_vertices,
                                    double dt, double least) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const ContactLists in = lists;
   LongestWay longest;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::longest_passage", Policy(0, vertices),
+      "corpuscle::contact::longest_passage", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, LongestWay& sum) {
         const Vec3 velocity = load(s.v, v);
         for (int e = in.first(v); e < in.first(v + 1); ++e) {
+          if (!counts(s, v, in.item(e), own_vertices)) continue;
           const int t = item_triangle(s, in.item(e));
           Vec3 relative[3];
           bool slow = true;

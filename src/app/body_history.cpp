@@ -16,6 +16,8 @@ const std::vector<std::string> parachute_columns = {"rear_hollow_um", "front_dim
                                                 "asymmetry"};
 /// Further columns of rigid bodies: the force from the fluid's momentum balance, beside that from tractions.
 const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance_force_y_nN", "balance_force_z_nN"};
+/// And that of cells that touch them.
+const std::vector<std::string> contact_columns = {"contact_force_x_nN", "contact_force_y_nN", "contact_force_z_nN"};
 
 }  // namespace
 
@@ -38,7 +40,11 @@ BodyHistory::BodyHistory(const std::string& folder, const Case& scene, FlowSimul
     if (few_cells_)
       for (const auto& cell : scene.cells) axes_.push_back(cell.axis);
   }
-  if (columns.bodies) columns.more.insert(columns.more.end(), balance_columns.begin(), balance_columns.end());
+  if (columns.bodies) {
+    body_columns_ = balance_columns;
+    if (simulation.shared_cells()) body_columns_.insert(body_columns_.begin(), contact_columns.begin(), contact_columns.end());
+    columns.more.insert(columns.more.end(), body_columns_.begin(), body_columns_.end());
+  }
   history_ = std::make_unique<HistoryWriter>(folder, comm, columns, restart_us);
 }
 
@@ -123,10 +129,11 @@ void BodyHistory::measure_cells() {
   const auto& turned = few_cells_ ? measure_shapes() : none;
   for (std::size_t c = 0; c < cells.size(); ++c) {
     auto sample = cell_sample(static_cast<int>(c), cells[c], travelled[c], few_cells_ ? turned[c] : std::vector<double>());
-    if (simulation_.rigid_bodies()) sample.more.resize(shape_columns_.size() + balance_columns.size(), std::nan(""));
     last_.push_back(sample);
   }
   if (simulation_.shared_cells()) gather_samples();
+  for (auto& sample : last_)
+    if (!body_columns_.empty()) sample.more.resize(shape_columns_.size() + body_columns_.size(), std::nan(""));
 }
 
 /// Every rank's samples to all, if cells are few, and else their mean.
@@ -168,8 +175,10 @@ void BodyHistory::measure_bodies() {
   const auto* bodies = simulation_.rigid_bodies();
   auto& immersed = *simulation_.immersed();
   simulation_.coupling()->tractions_for_output();
-  std::vector<Triple> centre(simulation_.surfaces()->bodies);
-  for (int b = 0; b < bodies->count(); ++b) centre[simulation_.cells() + b] = bodies->centre(b);
+  const int first = immersed.surfaces().cells;
+  const double dt = simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us();
+  std::vector<Triple> centre(immersed.surfaces().bodies);
+  for (int b = 0; b < bodies->count(); ++b) centre[first + b] = bodies->centre(b);
   const auto loads = immersed.loads(centre);
   const auto balance_force = immersed.balance_forces();
   for (int b = 0; b < bodies->count(); ++b) {
@@ -179,10 +188,14 @@ void BodyHistory::measure_bodies() {
     sample.cell = number;
     sample.centroid_um = bodies->centre(b);
     sample.velocity_um_per_us = bodies->velocity(b);
-    sample.force_nN = loads[number][0];
-    sample.torque_nN_um = loads[number][1];
+    sample.force_nN = loads[first + b][0];
+    sample.torque_nN_um = loads[first + b][1];
     if (simulation_.membranes()) sample.more.assign(shape_columns_.size(), std::nan(""));
-    for (double f : balance_force[number]) sample.more.push_back(f);
+    if (simulation_.shared_cells()) {
+      const auto contact = simulation_.coupling()->contact_load(b, dt);
+      sample.more.insert(sample.more.end(), contact.begin(), contact.begin() + 3);
+    }
+    for (double f : balance_force[first + b]) sample.more.push_back(f);
     last_.push_back(sample);
   }
 }

@@ -71,7 +71,7 @@ class BodyHistory {
   bool few_cells_ = true;
   std::vector<Triple> axes_;  // of few cells, at the start
   std::unique_ptr<CellShapes> shapes_;
-  std::vector<std::string> shape_columns_;
+  std::vector<std::string> shape_columns_, body_columns_;
   std::unique_ptr<HistoryWriter> history_;
 #ifdef CORPUSCLE_HDF5
   std::unique_ptr<CellSeries> series_;  // of many cells

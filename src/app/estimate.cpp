@@ -222,7 +222,8 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   for (const auto& cell : scene.cells) size.vertices += vertices_of(cell);
   for (const auto& population : scene.populations)
     size.vertices += cells_of(population, scene, size) * vertices_of(scene.cell_types[population.type].cell);
-  for (const auto& body : scene.bodies) size.vertices += vertices_of(body, size);
+  for (const auto& body : scene.bodies) size.rigid += vertices_of(body, size);
+  size.vertices += size.rigid;
   size.cells_listed = static_cast<double>(scene.cells.size());
   size.shared = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   size.writes_cells = scene.output.cells;
@@ -246,7 +247,8 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
   const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
   const bool jumps = size.shared && scene.coupling->pressure == CouplingSettings::Pressure::sharp;
-  const double search = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : (surfaces ? 51 : 0);  // Transfer; ImmersedBoundary
+  const double transfer = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : 0;                        // Transfer
+  const double search = transfer + ((size.shared ? size.rigid > 0 : surfaces) ? 51 : 0);            // ImmersedBoundary
   const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 3 * 24 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
@@ -270,12 +272,13 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
       if (size.cut[d]) faces = std::max(faces, nodes / (size.block[d] + 2 * halo) * halo);
     mb.output += faces * 3 * 8 * 4 / bytes_per_mb;
   }
-  if (size.shared) {
-    mb.surfaces = of_shared_cells(scene, size) / bytes_per_mb;
+  // Geometry, motion, tractions and search of a vertex and its two triangles; its places under each image; the rows of the
+  // two immersed nodes beside it, with 16 entries for the velocity and for the pressure.
+  const double cutting = 1500 + 60 * size.images + 2 * 2 * 16 * 12;
+  if (size.shared) {  // and with contact each image of a rigid body is a surface
+    mb.surfaces = (of_shared_cells(scene, size) + size.rigid * (cutting + (size.images + 1) * 700)) / bytes_per_mb;
   } else {
-    // Geometry, motion, tractions and search of a vertex and its two triangles; its places under each image; the rows of the
-    // two immersed nodes beside it, with 16 entries for the velocity and for the pressure.
-    mb.surfaces = size.vertices * (1500 + 60 * size.images + 2 * 2 * 16 * 12) / bytes_per_mb;
+    mb.surfaces = size.vertices * cutting / bytes_per_mb;
   }
   return mb;
 }

@@ -16,6 +16,7 @@ struct SceneSize {
   bool sampled = true;               // skewness and spacing are the grid's; false: of a file that was not read
   double volume = 0;                 // um3, about; 0 where the grid was not sampled
   double vertices = 0;               // of all surfaces
+  double rigid = 0;                  // of them, those of rigid bodies, which every rank has
   double images = 1;                 // under which each surface is seen: 3 for every periodic direction
   double pairs = 0;                  // of the vertices of a cell, over the types of cells that move with the fluid
   double cells_listed = 0;           // cells of the whole scene

@@ -28,6 +28,14 @@ SurfaceShare share_of(const SharedCells& cells) {
           static_cast<hsize_t>(cells.total()), vertex_rows(cells), triangle_rows(cells), cell_rows(cells)};
 }
 
+/// Of surfaces that every rank has.
+std::unique_ptr<CellWriter> make_writer(const std::string& folder, const Comm& comm, const SurfaceSet& set, const std::string& name,
+                                        std::optional<double> restart_us) {
+  const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
+  const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
+  return std::make_unique<CellWriter>(folder, comm, to_int32(set.triangle), bodies, set.vertices, restart_us, name);
+}
+
 /// Vertices are numbered over all ranks' cells.
 std::unique_ptr<CellWriter> make_shared_writer(const std::string& folder, const Comm& comm, const SharedCells& cells,
                                                std::optional<double> restart_us) {
@@ -65,11 +73,9 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
                                             simulation.grid().owned_nodes().data(), restart_us);
   if (scene_.output.cells && simulation.shared_cells()) {
     cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
+    if (simulation.immersed()) bodies_ = make_writer(folder_, comm, simulation.immersed()->surfaces(), "bodies", restart_us);
   } else if (scene_.output.cells && simulation.surfaces()) {
-    const auto& set = *simulation.surfaces();
-    const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
-    const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
-    cells_ = std::make_unique<CellWriter>(folder_, comm, to_int32(set.triangle), bodies, set.vertices, restart_us);
+    cells_ = make_writer(folder_, comm, *simulation.surfaces(), "cells", restart_us);
   }
 #endif
 }
@@ -185,14 +191,20 @@ void FlowOutput::write_cells() {
   if (simulation_.steps() > 0) simulation_.coupling()->tractions_for_output();  // for traction_fallbacks as well
 #ifdef CORPUSCLE_HDF5
   if (!cells_) return;
-  if (simulation_.shared_cells()) return write_shared_cells();
-  const auto& set = *simulation_.surfaces();
-  const auto x = vertex_values(set.vertices, set.x), v = vertex_values(set.vertices, set.v);
-  const auto traction = vertex_values(set.vertices, simulation_.coupling()->tractions_for_output());
-  cells_->write(simulation_.time(), simulation_.steps(), x.data(),
-                {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}});
+  if (!simulation_.shared_cells()) return write_surfaces(*cells_, *simulation_.surfaces(), simulation_.coupling()->tractions_for_output());
+  write_shared_cells();
+  if (bodies_) write_surfaces(*bodies_, simulation_.immersed()->surfaces(), simulation_.immersed()->last_tractions());
 #endif
 }
+
+#ifdef CORPUSCLE_HDF5
+void FlowOutput::write_surfaces(CellWriter& writer, const SurfaceSet& set, const Components<double>& tractions) const {
+  const auto x = vertex_values(set.vertices, set.x), v = vertex_values(set.vertices, set.v);
+  const auto traction = vertex_values(set.vertices, tractions);
+  writer.write(simulation_.time(), simulation_.steps(), x.data(),
+               {{"velocity_um_per_us", 3, v.data()}, {"traction_kPa", 3, traction.data()}});
+}
+#endif
 
 /// This rank's own, with their figures.
 void FlowOutput::write_shared_cells() {

@@ -48,6 +48,9 @@ class FlowOutput {
   std::vector<double> wall_stress_Pa();
   void write_cells();
   void write_shared_cells();
+#ifdef CORPUSCLE_HDF5
+  void write_surfaces(CellWriter& writer, const SurfaceSet& set, const Components<double>& tractions) const;
+#endif
   void write_checkpoint_now();
   void sample_blood();
   RunTotals totals_now(bool together = true);
@@ -63,6 +66,7 @@ class FlowOutput {
 #ifdef CORPUSCLE_HDF5
   std::unique_ptr<FieldWriter> fields_;
   std::unique_ptr<CellWriter> cells_;
+  std::unique_ptr<CellWriter> bodies_;  // beside cells that are shared out
 #endif
   std::string last_checkpoint_;
   std::unique_ptr<BloodSampler> blood_;

@@ -78,10 +78,11 @@ Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, co
   Kokkos::deep_copy(rest_.area, surfaces.area);
 }
 
-void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type) {
+void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type, const SurfaceSet* rigid) {
   surface_ = set;
   make_arrays();
-  fill_rest(types, type, surface_, rest_.x, rest_.area);
+  fill_rest(types, type, surface_, 0, movable_, rest_.x, rest_.area);
+  if (rigid) fill_rest(*rigid, type, surface_, movable_, surface_.vertices, rest_.x, rest_.area);
   if (longest_way_ == 0) longest_way_ = followed_way * smallest_radius(types, types.bodies);
 }
 
@@ -263,11 +264,14 @@ void Contact::look(double time, double dt) {
 
 /// Of all ranks together.
 void Contact::note_gaps() {
-  double least[2] = {least_of(gap_), least_own_gap(surface_, lists_, now_)};
+  const bool rigid = surface_.bodies > surface_.cells;
+  double least[3] = {rigid ? least_gap_to(false, surface_, lists_, now_) : least_of(gap_), least_own_gap(surface_, lists_, now_),
+                     rigid ? least_gap_to(true, surface_, lists_, now_) : far_away};
   if (peers_)
     for (double& gap : least) gap = peers_->comm.min(gap);
   report_.smallest_gap = std::min(report_.smallest_gap, least[0]);
   report_.smallest_own_gap = std::min(report_.smallest_own_gap, least[1]);
+  report_.smallest_body_gap = std::min(report_.smallest_body_gap, least[2]);
 }
 
 void Contact::look_at_start(double dt) {
@@ -313,9 +317,15 @@ void Contact::add_forces(double dt, bool ahead, const Components<double>& force)
 }
 
 double Contact::energy(double dt) const {
-  const int vertices = peers_ ? own_ : surface_.vertices;
-  const double here = contact_energy(surface_, law(dt), rest_, lists_, now_, vertices);
+  const double here = contact_energy(surface_, law(dt), rest_, lists_, now_, own_);
   return peers_ ? peers_->comm.sum(here) : here;
+}
+
+std::array<double, 4> Contact::load_on_rigid(double dt, int body) const {
+  const Sums<4> here = contact_load_on_rigid(surface_, law(dt), rest_, lists_, now_, own_, body);
+  std::array<double, 4> all{here[0], here[1], here[2], here[3]};
+  if (peers_) peers_->comm.sum(all.data(), 4);
+  return all;
 }
 
 }  // namespace corpuscle

@@ -2,6 +2,7 @@
 // and undone.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -41,8 +42,8 @@ class Contact {
           double blend_um, const ContactPeers* peers = nullptr);
 
   /// The surfaces are others from now on: those of `set`, of the types of cells in `types`. look() must follow.
-  /// @param type  [body] of set
-  void take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type);
+  /// @param type   [body] of set: rigid ones are of the types in `rigid`, by number
+  void take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type, const SurfaceSet* rigid = nullptr);
 
   /// What is near what at the surfaces' present positions. Crossings are counted, told and undone.
   /// @param dt  of the next step, us
@@ -66,10 +67,12 @@ class Contact {
   /// Fastest rate at which aggregated membranes relax, 1/us; the repulsion adapts to the step.
   double fastest_relaxation_per_us() const;
 
-  /// [vertex] um to the nearest other body, of look() or add_forces(), whichever was last; large where nothing is near.
+  /// [vertex] um to the nearest other body, rigid ones included, of look() or add_forces(), whichever was last; large where nothing is near.
   const Array<double>& gaps() const { return gap_; }
   /// Energy of the contacts that look() saw, fJ, of all ranks.
   double energy(double dt) const;
+  /// Their force on a rigid body, nN, of all ranks, and its power, nW. @param body  its number among these
+  std::array<double, 4> load_on_rigid(double dt, int body) const;
   const Array<double>& rest_area() const { return rest_.area; }
   /// Up to which gap other bodies are looked for, um.
   double reach() const { return reach_.other; }

@@ -81,9 +81,12 @@ double Contact::fastest_crossing(double dt) const {
   const auto triangle = host_of(surface_.triangle);
   const auto v = host_of(surface_.v);
   double most = 0;
-  for (int i = 0; i < own_; ++i)
+  const auto body = host_of(surface_.vertex_body);
+  for (int i = 0; i < surface_.vertices; ++i)
     for (int g = first(i); g < first(i + 1); ++g) {
       if (item(g) < 0 || gap(g) >= 0) continue;
+      const bool counting = i < own_ || (body(i) >= surface_.cells && triangle(item_triangle(surface_, item(g)), 0) < own_);
+      if (!counting) continue;
       Vec3 velocity = load(v, i);
       for (int d = 0; d < 3; ++d) velocity -= weight(g, d) * load(v, triangle(item_triangle(surface_, item(g)), d));
       most = std::max(most, -dt * dot(velocity, load(normal, g)));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "cells/rank_blocks.hpp"
 #include "core/error.hpp"
 #include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
@@ -24,20 +25,78 @@ WallSides walls_of(const Case& scene) {
   return walls;
 }
 
+template <class View>
+auto host_of(const View& view) {
+  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
+}
+
+void widen(SpaceBox& box, double by) {
+  for (int d = 0; d < 3; ++d) box.lower[d] -= by, box.upper[d] += by;
+}
+
+SpaceBox box_of(const HostMirror<Components<double>>& x, int first, int last) {
+  SpaceBox box{{1e300, 1e300, 1e300}, {-1e300, -1e300, -1e300}};
+  for (int v = first; v < last; ++v)
+    for (int d = 0; d < 3; ++d) {
+      box.lower[d] = std::min(box.lower[d], x(v, d));
+      box.upper[d] = std::max(box.upper[d], x(v, d));
+    }
+  return box;
+}
+
+/// How far from its middle a cell may reach: three times as far as at rest, um.
+double farthest(const SurfaceSet& templates) {
+  constexpr double stretched = 3;
+  const auto x = host_of(templates.x);
+  const auto first = host_of(templates.first_vertex);
+  double most = 0;
+  for (int type = 0; type < templates.bodies; ++type) {
+    const SpaceBox box = box_of(x, first(type), first(type + 1));
+    most = std::max(most, 0.5 * norm(box.upper - box.lower));
+  }
+  return stretched * most;
+}
+
+/// Images of rigid bodies that this rank's cells may come to meet, whose middles are within `block`. Those of bodies that move are all.
+std::vector<std::pair<int, Vec3>> images_of(const Case& scene, const SurfaceSet& rigid, const Grid& grid, SpaceBox block, double reach) {
+  const auto x = host_of(rigid.x);
+  const auto first = host_of(rigid.first_vertex);
+  widen(block, reach);
+  std::vector<std::pair<int, Vec3>> images;
+  for (int b = 0; b < rigid.bodies; ++b) {
+    const BodySettings& body = scene.bodies[b];
+    const bool moves = body.velocity_um_per_us != Triple{} || body.angular_velocity_rad_per_us != Triple{};
+    const SpaceBox here = box_of(x, first(b), first(b + 1));
+    for (const Vec3& shift : period_shifts(grid))
+      if (moves || overlap(block, {here.lower + shift, here.upper + shift})) images.emplace_back(b, shift);
+  }
+  return images;
+}
+
 }  // namespace
 
 bool CellLoads::wanted(const Case& scene) {
   return scene.contact || std::any_of(scene.cells.begin(), scene.cells.end(), pushed);
 }
 
-CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity)
+CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
+                     const SurfaceSet* rigid)
     : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer) {
   if (scene.contact) {
     const double blend = scene.coupling->slip ? slip_reach * comm_.max(transfer.largest_spacing()) : 0;
-    const ContactPeers peers{comm_, [&cells] { cells.to_copies(cells.surfaces().x, true); }};
+    const ContactPeers peers{comm_, [this] {
+                               if (joined_) joined_->give_back(cells_.surfaces());
+                               cells_.to_copies(cells_.surfaces().x, true);
+                               follow_bodies();
+                             }};
     contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
     walls_ = walls_of(scene);
     refuse_thin_blocks(scene.contact->range_um);
+    if (rigid) {
+      const double reach = farthest(membranes_.templates()) + 2 * contact_->reach();
+      joined_ = std::make_unique<JoinedSurfaces>(
+          *rigid, images_of(scene, *rigid, grid, {transfer.search().lower, transfer.search().upper}, reach));
+    }
   }
   for (std::size_t c = 0; c < scene.cells.size(); ++c)
     if (pushed(scene.cells[c])) push_[static_cast<int>(c)] = scene.cells[c].push_nN;
@@ -67,7 +126,12 @@ void CellLoads::refuse_thin_blocks(double range) const {
 void CellLoads::take_up() {
   const SurfaceSet& set = membranes_.surfaces();
   force_ = Components<double>("corpuscle::coupling::load", set.vertices, 3);
-  if (contact_) contact_->take_up(set, membranes_.templates(), membranes_.views().type);
+  if (joined_) {
+    joined_->take_up(set, membranes_.templates(), membranes_.views().type);
+    contact_->take_up(joined_->set(), membranes_.templates(), joined_->type(), &joined_->rigid());
+  } else if (contact_) {
+    contact_->take_up(set, membranes_.templates(), membranes_.views().type);
+  }
   if (walls_.any()) wall_ = Components<double>("corpuscle::contact::wall_load", set.vertices, 3);
   if (push_.empty()) return;
   share_ = Table<double>("corpuscle::coupling::push_share", membranes_.cells() + 1, 3);
@@ -81,8 +145,13 @@ void CellLoads::take_up() {
   Kokkos::deep_copy(share_, share);
 }
 
+void CellLoads::follow_bodies() {
+  if (joined_) joined_->update(membranes_.surfaces());
+}
+
 void CellLoads::look_at_start(double dt) {
   if (!contact_) return;
+  follow_bodies();
   contact_->look_at_start(dt);
   note_wall_gap();
 }
@@ -98,20 +167,24 @@ void CellLoads::note_wall_gap() {
 }
 
 void CellLoads::look(double time, double dt) {
+  follow_bodies();
   if (contact_) contact_->look(time, dt);
 }
 
 void CellLoads::limit_approach(double time) {
+  follow_bodies();
   if (contact_) contact_->limit_approach(time);
 }
 
 void CellLoads::limit_ahead() {
+  follow_bodies();
   if (contact_) contact_->limit_ahead();
 }
 
 void CellLoads::gather(double dt, bool ahead) {
   start_loads(membranes_.vertices(), membranes_.views().force, membranes_.surfaces().vertex_body, share_, force_);
   if (!contact_) return;
+  follow_bodies();
   contact_->add_forces(dt, ahead, force_);
   if (walls_.any()) add_walls(dt);
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "contact/contact.hpp"
+#include "contact/joined_surfaces.hpp"
 #include "contact/wall_contact.hpp"
 #include "cells/shared_cells.hpp"
 #include "transfer/transfer.hpp"
@@ -14,13 +15,21 @@ namespace corpuscle {
 class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
+  /// @param rigid      rigid bodies that cells meet; null for none
   /// @throws InputError  where walls act beyond the blocks beside them
-  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity);
+  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
+            const SurfaceSet* rigid = nullptr);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
 
   /// The cells at hand are others from now on. look() must follow, with valid copies.
   void take_up();
+  /// The rigid bodies have moved.
+  void follow_bodies();
+  /// Membranes and rigid bodies; null where there are none of these.
+  const SurfaceSet* joined() const { return joined_ ? &joined_->set() : nullptr; }
+  /// Of contacts on a rigid body, nN and nW.
+  std::array<double, 4> load_on_rigid(double dt_us, int body) const { return contact_->load_on_rigid(dt_us, body); }
   /// After Transfer::place().
   /// @throws InputError  if cells cross where they start
   void look_at_start(double dt_us);
@@ -61,7 +70,8 @@ class CellLoads {
   const Membranes& membranes_;
   const Comm comm_;
   const Transfer& transfer_;
-  std::unique_ptr<Contact> contact_;  // only with [contact]
+  std::unique_ptr<Contact> contact_;        // only with [contact]
+  std::unique_ptr<JoinedSurfaces> joined_;  // and rigid bodies
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
   Components<double> wall_;   // [vertex, 3] nN; only with walls

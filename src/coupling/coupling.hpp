@@ -7,6 +7,7 @@
 #include "coupling/step_schedule.hpp"
 #include "membrane/membranes.hpp"
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -79,10 +80,13 @@ class Coupling {
   /// Of forces on the cells from outside, nW, and what the contacts between them have stored after a step of that length, fJ.
   virtual double power_of_pushes() { return 0; }
   virtual double contact_energy(double) { return 0; }
+  /// Of cells that touch a rigid body on it, nN, and its power, nW, after a step of that length. All ranks call.
+  virtual std::array<double, 4> contact_load(int /*body*/, double /*dt_us*/) { return {}; }
   /// How contacts went; nothing without [contact].
   virtual std::optional<ContactReport> contact_report() const { return std::nullopt; }
   virtual void resume_contact(const ContactReport&) {}
 
+  /// Of the membranes if these are shared out; else of all bodies.
   virtual const SurfaceSet& surfaces() const = 0;
   /// Null where there are none.
   virtual Membranes* membranes() { return nullptr; }
@@ -97,7 +101,7 @@ class Coupling {
   virtual int cells() { return membranes() ? membranes()->cells() : 0; }
   virtual long vertices() { return surfaces().vertices; }
   virtual RigidBodies* rigid_bodies() { return nullptr; }
-  /// The search and the flow at surfaces that cut the grid; null where none does.
+  /// The search and the flow at surfaces that cut the grid, those of membranes that are shared out not among them; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
   /// Of cells on sides that move, past the fluid, nW: what spreads their forces reaches a side beside them.
   virtual double power_on_sides() { return 0; }

@@ -53,11 +53,23 @@ std::optional<double> share(double left_over, double scale, double floor) {
 
 }  // namespace
 
+/// Of membranes that are forces.
+void EnergyBalance::add_shared_cells(EnergyTotals& now) {
+  Coupling& coupling = *simulation_.coupling();
+  const double dt = simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us();
+  now.on_cells = coupling.power_on_cells();
+  now.boundaries -= coupling.power_on_sides();
+  now.dissipation += coupling.unresolved_dissipation();
+  now.pushed = coupling.power_of_pushes();
+  now.contact = coupling.contact_energy(dt);
+  const int bodies = coupling.rigid_bodies() ? coupling.rigid_bodies()->count() : 0;
+  for (int body = 0; body < bodies; ++body) now.on_bodies += coupling.contact_load(body, dt)[3];
+}
+
 void EnergyBalance::sample(double elastic_fJ) {
-  const SurfaceSet* surfaces = simulation_.surfaces();
   FluidSolver& fluid = simulation_.fluid();
   const bool cut = simulation_.immersed() != nullptr;  // fluid outside bodies only
-  const FluidEnergy flow = flow_energy(fluid, cut ? enclosed_volume(*surfaces) : 0.0);
+  const FluidEnergy flow = flow_energy(fluid, cut ? enclosed_volume(simulation_.immersed()->surfaces()) : 0.0);
   EnergyTotals now;
   now.boundaries = flow.boundaries_nW;
   now.gradient = flow.gradient_nW;
@@ -67,23 +79,19 @@ void EnergyBalance::sample(double elastic_fJ) {
   const double through = 1e-3 * fluid.statistics().reference_speed * std::pow(fluid.grid().total_volume(), 2.0 / 3);
   state_.driving_pressure = flow.inflow_um3_per_us > through ? flow.boundaries_nW / flow.inflow_um3_per_us : 0;
   if (cut) {
+    const SurfaceSet& cutting = simulation_.immersed()->surfaces();
     const auto& stress = simulation_.immersed()->last_stress();
-    const int of_cells = simulation_.membranes() ? simulation_.membranes()->vertices() : 0;
-    if (of_cells > 0) now.on_cells = fluid_power(*surfaces, stress, 0, of_cells);
-    if (of_cells < surfaces->vertices) now.on_bodies = fluid_power(*surfaces, stress, of_cells, surfaces->vertices);
-    now.dissipation -= fluid.viscosity() * surface_gradient_work(*surfaces);
-  } else if (surfaces) {
-    now.on_cells = simulation_.coupling()->power_on_cells();
-    now.boundaries -= simulation_.coupling()->power_on_sides();
-    now.dissipation += simulation_.coupling()->unresolved_dissipation();
-    now.pushed = simulation_.coupling()->power_of_pushes();
-    now.contact = simulation_.coupling()->contact_energy(simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us());
+    const int of_cells = cutting.cells > 0 ? simulation_.membranes()->vertices() : 0;
+    if (of_cells > 0) now.on_cells = fluid_power(cutting, stress, 0, of_cells);
+    if (of_cells < cutting.vertices) now.on_bodies = fluid_power(cutting, stress, of_cells, cutting.vertices);
+    now.dissipation -= fluid.viscosity() * surface_gradient_work(cutting);
   }
+  if (simulation_.shared_cells()) add_shared_cells(now);
   if (auto* membranes = simulation_.membranes()) {
     now.elastic = elastic_fJ;
     now.membrane_dissipation = membranes->dissipation_nW();
     if (simulation_.shared_cells()) now.membrane_dissipation = simulation_.grid().comm().sum(now.membrane_dissipation);
-    if (cut) now.membrane_kinetic = membranes->kinetic_energy_fJ();
+    if (!simulation_.shared_cells()) now.membrane_kinetic = membranes->kinetic_energy_fJ();
   }
   if (state_.samples == 0) {
     state_.first = now;

@@ -15,7 +15,7 @@ struct EnergyTotals {
   double dissipation = 0;            // in the fluid, integral of 2 mu D : D
   double kinetic = 0;                // change of the fluid's
   double on_cells = 0;               // by tractions
-  double on_bodies = 0;              // by tractions, on those that move as prescribed
+  double on_bodies = 0;              // by tractions and contacts, on those that move as prescribed
   double pushed = 0;                 // on the cells by forces from outside
   double elastic = 0;                // change of the membranes'
   double contact = 0;                // change of that of contacts
@@ -54,6 +54,8 @@ class EnergyBalance {
   double driving_pressure_kPa() const { return state_.driving_pressure; }
 
  private:
+  void add_shared_cells(EnergyTotals& now);
+
   FlowSimulation& simulation_;
   State state_;
 };

@@ -26,6 +26,7 @@ Case without_cells(const Case& scene) {
   rest.fluid = scene.fluid;
   rest.boundaries = scene.boundaries;
   rest.coupling = scene.coupling;
+  rest.bodies = scene.bodies;
   return rest;
 }
 
@@ -59,7 +60,13 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
   if (sharp_pressure()) transfer_->sharpen_pressure();
-  if (CellLoads::wanted(scene)) loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.viscosity());
+  if (!scene.bodies.empty()) {
+    bodies_ = std::make_unique<SharpCoupling>(scene_, fluid, timers, nullptr);
+    bodies_->immersed()->boundary().wrap(0, bodies_->surfaces().bodies, true);
+  }
+  if (CellLoads::wanted(scene))
+    loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.grid(), fluid.viscosity(),
+                                         bodies_ ? &bodies_->surfaces() : nullptr);
   fluid.set_face_force(transfer_->faces());
   std::vector<double> ratios;
   for (const CellReference& type : membranes_->types()) ratios.push_back(type.viscosity_ratio);
@@ -181,6 +188,7 @@ void ForceCoupling::check_start() {
   wrong = agree(comm, wrong);
   if (!wrong.empty()) throw InputError(wrong);
   coarse_ = warn_of_coarse(worst_of_types(comm, static_cast<int>(membranes_->types().size()), coarse));
+  check_bodies();
   try {
     place(0);
     fill_cells(0);
@@ -348,6 +356,10 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   {
     const auto scope = timers_.scope("membrane");
     begin_step(time, dt, ahead);
+  }
+  if (bodies_) bodies_->move_bodies(time + dt);
+  {
+    const auto scope = timers_.scope("membrane");
     membranes_->set_out(ahead);
     cells_->to_copies(surfaces().x, true);
     if (loads_ && ahead > 0) loads_->limit_ahead();
@@ -376,7 +388,10 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     else
       transfer_->spread(forces(), used);
   }
-  fluid_.solve(time + dt, nullptr);
+  if (bodies_)
+    bodies_->solve_flow(time + dt);
+  else
+    fluid_.solve(time + dt, nullptr);
   {
     const auto scope = timers_.scope("transfer");
     const SlipViews slip = slip_of_membranes();
@@ -443,6 +458,7 @@ void ForceCoupling::after_move(double time, double dt) {
 }
 
 void ForceCoupling::resume(double time) {
+  if (bodies_) bodies_->resume(time);
   if (!loads_) return;
   update_copies();
   look(time, next_step_us(time, lengths_us_.front()));
@@ -456,7 +472,7 @@ SlipViews ForceCoupling::slip_of_membranes() const {
 double ForceCoupling::unresolved_dissipation() {
   double loss = face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
   if (scene_.coupling->slip) loss += slip_power(transfer_->block(), slip_of_membranes(), transfer_->views());
-  return fluid_.grid().comm().sum(loss);
+  return fluid_.grid().comm().sum(loss) + loss_beside_bodies();
 }
 
 double ForceCoupling::power_on_sides() {
@@ -471,6 +487,7 @@ double ForceCoupling::power_on_sides(const Components<double>& of_sides) {
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
+  if (bodies_) bodies_->tractions_for_output();
   const std::size_t vertices = membranes_->vertices();
   traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);
   force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);

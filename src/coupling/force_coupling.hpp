@@ -1,10 +1,10 @@
-// coupling.scheme = "force": membranes are forces in a fluid that is everywhere, and move with it.
+// coupling.scheme = "force": membranes are forces in a fluid that is everywhere but in rigid bodies, and move with it.
 #pragma once
 
 #include "cells/shared_cells.hpp"
 #include "core/error.hpp"
 #include "coupling/cell_loads.hpp"
-#include "coupling/coupling.hpp"
+#include "coupling/sharp_coupling.hpp"
 #include "parallel/agree.hpp"
 #include "populations/populations.hpp"
 #include "transfer/cytosol.hpp"
@@ -48,6 +48,10 @@ class ForceCoupling : public Coupling {
   const SurfaceSet& surfaces() const override { return cells_->surfaces(); }
   Membranes* membranes() override { return membranes_; }
   SharedCells* shared_cells() override { return cells_.get(); }
+  RigidBodies* rigid_bodies() override { return bodies_ ? bodies_->rigid_bodies() : nullptr; }
+  ImmersedFlow* immersed() override { return bodies_ ? bodies_->immersed() : nullptr; }
+  /// And of what falls upon the nodes next to the body when cells' forces are spread.
+  std::array<double, 4> contact_load(int body, double dt_us) override;
   int cells() override { return cells_->total(); }
   long vertices() override { return cells_->total_vertices(); }
   const PackingReport* packing() const override { return packing_ ? &*packing_ : nullptr; }
@@ -56,6 +60,9 @@ class ForceCoupling : public Coupling {
  private:
   void take_places(const Case& scene, const PackedCells* packed, double contact_um);
   void check_packing();
+  void check_bodies();
+  std::array<double, 5> load_beside(int body) const;
+  double loss_beside_bodies() const;
   void warn_of_image() const;
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
@@ -103,6 +110,7 @@ class ForceCoupling : public Coupling {
   std::vector<double> lengths_us_;  // of all steps there will be
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
+  std::unique_ptr<SharpCoupling> bodies_;  // rigid ones, and the flow around them; null without any
   std::optional<PackingReport> packing_;  // only with populations
   std::optional<PackedShare> packed_;
   double packed_gap_ = 0;                 // um, the least of the populations'

@@ -88,6 +88,8 @@ class ImmersedFlow {
   /// Go on counting from those of a stopped run.
   void resume(const ImmersedReport& counts) { report_ = counts; }
   FluidSolver& fluid() { return fluid_; }
+  /// Those that cut the grid.
+  const SurfaceSet& surfaces() const { return surfaces_; }
   ImmersedBoundary& boundary() { return *boundary_; }
   const EmbeddedBodies& bodies() const { return bodies_; }
 

@@ -212,7 +212,7 @@ FluidState read_fluid(const CheckpointReader& file, FlowSimulation& simulation) 
 
 /// Nodes are classified as they were in the last step, and then the surfaces put where that step left them.
 void read_surfaces(const CheckpointReader& file, FlowSimulation& simulation) {
-  const SurfaceSet& surfaces = *simulation.surfaces();
+  const SurfaceSet& surfaces = simulation.immersed()->surfaces();
   std::vector<double> positions(3 * static_cast<std::size_t>(surfaces.vertices));
   file.read("classified_positions", {positions.size() / 3, 3}, positions.data());
   simulation.immersed()->resume(positions);

@@ -21,6 +21,7 @@ class RigidBodies {
   /// Centre of body b at the time last moved to, um.
   const Triple& centre(int b) const { return centre_[b]; }
   Triple velocity(int b) const { return settings_[b].velocity_um_per_us; }
+  Triple angular_velocity(int b) const { return settings_[b].angular_velocity_rad_per_us; }
   int count() const { return static_cast<int>(settings_.size()); }
   /// Largest speed of any vertex, um/us.
   double largest_speed() const;

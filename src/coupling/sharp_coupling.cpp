@@ -57,13 +57,20 @@ void SharpCoupling::move_rigid_bodies(double time) {
   immersed_->boundary().wrap(surfaces_->cells, surfaces_->bodies, true);
 }
 
-StepStatistics SharpCoupling::advance(double time, double dt) {
-  if (rigid_bodies_->moving()) {
-    move_rigid_bodies(time + dt);
-    immersed_->update_geometry(smallest_gap);
-  }
-  immersed_->solve(time + dt);
+void SharpCoupling::move_bodies(double time) {
+  if (!rigid_bodies_->moving()) return;
+  move_rigid_bodies(time);
+  immersed_->update_geometry(smallest_gap);
+}
+
+void SharpCoupling::solve_flow(double time) {
+  immersed_->solve(time);
   has_flow_ = true;
+}
+
+StepStatistics SharpCoupling::advance(double time, double dt) {
+  move_bodies(time + dt);
+  solve_flow(time + dt);
   return {};
 }
 

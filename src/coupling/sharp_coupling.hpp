@@ -12,6 +12,9 @@ class SharpCoupling : public Coupling {
 
   void check_start() override;
   StepStatistics advance(double time_us, double dt_us) override;
+  /// What advance() does one after the other, without membranes: bodies that move go to where they are then, and the flow is solved.
+  void move_bodies(double time_us);
+  void solve_flow(double time_us);
   void resume(double time_us) override;
   const Components<double>& tractions_for_output() override;
   std::string coarse() const override { return coarse_; }

@@ -320,6 +320,15 @@ std::vector<CoarseSurface> check_surfaces(const Grid& grid, const Case& scene, c
   return coarse;
 }
 
+void check_clear_of_bodies(const SurfaceSet& surfaces) {
+  const HostSurfaces s(surfaces);
+  for (int cell = 0; cell < surfaces.cells; ++cell)
+    for (int body = surfaces.cells; body < surfaces.bodies; ++body) {
+      check_outside(s, cell, body, Triple{});
+      check_outside(s, body, cell, Triple{});
+    }
+}
+
 std::vector<CoarseSurface> worst_of_types(const Comm& comm, int types, const std::vector<CoarseSurface>& here) {
   std::vector<CoarseSurface> result;
   for (int type = 0; type < types; ++type)

@@ -32,6 +32,9 @@ struct CoarseSurface {
 /// @throws InputError  for a body that is larger than the grid, not resolved by it, inside another or across it
 std::vector<CoarseSurface> check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces,
                                           const std::vector<int>& types = {});
+/// Of a set with cells and rigid bodies, images of these among them.
+/// @throws InputError  where one is in the other
+void check_clear_of_bodies(const SurfaceSet& surfaces);
 /// Of each type and kind the worst on any rank, the same on all. Every rank calls.
 std::vector<CoarseSurface> worst_of_types(const Comm& comm, int types, const std::vector<CoarseSurface>& here);
 /// @returns all texts, for messages about a run that breaks down later; "" if there are none

@@ -50,11 +50,20 @@ void check_sharp_scheme(const Case& scene, const Complaint& complain) {
                "needs coupling.scheme = \"force\": with the others cells have no fluid inside. Leave it out, or set that scheme");
 }
 
-/// What membranes that are forces do not have yet.
+/// What rigid bodies beside membranes that are forces need, and what there is not with them.
 void check_force_scheme(const Case& scene, const Complaint& complain) {
-  if (!scene.bodies.empty())
+  if (scene.bodies.empty()) return;
+  if (!scene.contact)
     complain("bodies", "",
-             "there are no rigid bodies beside membranes that are forces (coupling.scheme = \"force\") yet: leave them out");
+             "cells that are forces (coupling.scheme = \"force\") feel rigid bodies through contact, which also tells of one that gets into "
+             "a body: add [contact]");
+  if (!scene.populations.empty())
+    complain("populations", "",
+             "cells are not packed around rigid bodies: leave these out, or place the cells one by one in [[cells]]");
+  if (scene.blood)
+    complain("blood", "",
+             "blood is measured in channels without obstacles, where its volume, profiles and plasma's flow are known: leave this section "
+             "out, or the rigid bodies ([[bodies]])");
 }
 
 /// Cells that the program places.
@@ -79,6 +88,7 @@ void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const C
   const std::string cell = fmt::format("cells.{}", first);
   if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force)
     complain(cell, "push_nN", "only membranes that are forces (coupling.scheme = \"force\") can be pushed: leave it out, or use that scheme");
+  if (!scene.bodies.empty()) return;  // which are held
   for (int side : entry_of) {
     const auto type = scene.boundaries[side].type;
     if (type != Type::periodic && type != Type::symmetry) return;

@@ -143,7 +143,7 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   fill(set.first_triangle, first_triangle);
   fill(set.number, number);
   fill(views_.type, type);
-  if (set.bodies > 0) fill_topology(templates_, views_.type, set);
+  if (set.bodies > 0) fill_topology(templates_, views_.type, set, 0, set.bodies);
   if (viscosity_) viscosity_->hold(views_);
   describe_cells(cells, own);
   stiffness_.clear();

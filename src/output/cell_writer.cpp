@@ -17,11 +17,12 @@ const std::string format_name = "a series of surfaces of Corpuscle";
 }  // namespace
 
 CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
-                       const std::vector<std::int32_t>& bodies, int vertices, std::optional<double> restart_us)
+                       const std::vector<std::int32_t>& bodies, int vertices, std::optional<double> restart_us, const std::string& name)
     : comm_(comm),
+      name_(name),
       vertices_(static_cast<hsize_t>(vertices)),
       triangles_(triangles.size() / 3),
-      series_(folder, "cells", format_name, comm, "mesh", {"triangles", "body"},
+      series_(folder, name, format_name, comm, "mesh", {"triangles", "body"},
               [this](const StoredTime& time, const Hdf5File& file) { return describe(time, file); }) {
   begin(folder, restart_us, [&] { create(triangles, bodies); });
 }
@@ -29,6 +30,7 @@ CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::v
 CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
                        const std::vector<std::int32_t>& bodies, const SurfaceShare& mine, std::optional<double> restart_us)
     : comm_(comm),
+      name_("cells"),
       vertices_(mine.vertices),
       triangles_(mine.triangles),
       series_(folder, "cells", format_name, comm, "mesh", {"triangles", "body"},
@@ -38,7 +40,7 @@ CellWriter::CellWriter(const std::string& folder, const Comm& comm, const std::v
 
 void CellWriter::begin(const std::string& folder, std::optional<double> restart_us, const std::function<void()>& create) {
   if (restart_us && series_.exists()) {
-    on_root(comm_, [&] { require_same_surfaces((std::filesystem::path(folder) / "cells.h5").string()); });
+    on_root(comm_, [&] { require_same_surfaces((std::filesystem::path(folder) / (name_ + ".h5")).string()); });
     series_.resume(*restart_us);
   } else {
     series_.create();
@@ -69,7 +71,7 @@ void CellWriter::create(const std::vector<std::int32_t>& triangles, const std::v
 
 void CellWriter::require_same_surfaces(const std::string& path) const {
   stored_times(path, format_name);
-  const auto mesh = (std::filesystem::path(path).parent_path() / "cells" / "mesh.h5").string();
+  const auto mesh = (std::filesystem::path(path).parent_path() / name_ / "mesh.h5").string();
   const auto file = Hdf5File::read(mesh);
   const auto vertices = static_cast<hsize_t>(file.integer("/", "vertices"));
   if (vertices != vertices_ || file.shape("triangles") != Shape{triangles_, 3})
@@ -111,7 +113,7 @@ void CellWriter::write(double time_us, long step, const SurfaceShare& mine, cons
 }
 
 std::string CellWriter::describe(const StoredTime& time, const Hdf5File& file) const {
-  const std::string mesh = "cells/mesh.h5", own = "cells/" + time.group + ".h5";
+  const std::string mesh = name_ + "/mesh.h5", own = name_ + "/" + time.group + ".h5";
   auto text =
       fmt::format("    <Topology TopologyType=\"Triangle\" NumberOfElements=\"{}\">\n     {}\n    </Topology>\n",
                   triangles_, xdmf_item(mesh, "triangles", {triangles_, 3}, "Int", 4));

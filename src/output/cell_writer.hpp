@@ -1,4 +1,5 @@
-// cells.h5 and cells.xdmf: the surfaces of all cells and bodies at stored times, as ParaView opens them.
+// cells.h5 and cells.xdmf: the surfaces of all cells and bodies at stored times, as ParaView opens them; of the bodies beside cells that are
+// shared out bodies.h5 and bodies.xdmf.
 #pragma once
 
 #ifdef CORPUSCLE_HDF5
@@ -30,9 +31,11 @@ class CellWriter {
   /// @param bodies      body of each triangle
   /// @param vertices    how many there are
   /// @param restart_us  an existing file keeps its times up to this one and is continued; absent: a new file
+  /// @param name        of the files
   /// @throws InputError  on every rank, if the files cannot be written or the one to continue has other surfaces
   CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
-             const std::vector<std::int32_t>& bodies, int vertices, std::optional<double> restart_us = {});
+             const std::vector<std::int32_t>& bodies, int vertices, std::optional<double> restart_us = {},
+             const std::string& name = "cells");
 
   /// Surfaces that are shared out: three vertex numbers and the body of each of this rank's triangles. Every rank calls.
   CellWriter(const std::string& folder, const Comm& comm, const std::vector<std::int32_t>& triangles,
@@ -56,6 +59,7 @@ class CellWriter {
   std::string describe(const StoredTime& time, const Hdf5File& file) const;
 
   Comm comm_;
+  std::string name_;
   hsize_t vertices_, triangles_;
   Series series_;
 };

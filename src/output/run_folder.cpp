@@ -27,7 +27,8 @@ constexpr const char* lock_name = ".corpuscle.lock";
 constexpr const char* run_name = ".corpuscle.run";
 const std::vector<std::string> result_files = {"report.json", "history.csv", "fields.h5",    "fields.xdmf",
                                                "cells.h5",    "cells.xdmf",  "checkpoint.h5", "blood.csv",
-                                               "blood.h5",    "cell_series.h5", "cell_series.xdmf"};
+                                               "blood.h5",    "cell_series.h5", "cell_series.xdmf",
+                                               "bodies.h5",   "bodies.xdmf"};
 
 std::string first_result(const fs::path& folder) {
   for (const auto& name : result_files)
@@ -66,7 +67,7 @@ void remove_results(const std::string& folder) {
     for (const char* unfinished : {".part", ".old"}) fs::remove(fs::path(folder) / (name + unfinished), ignored);
   }
   fs::remove(fs::path(folder) / run_name, ignored);
-  for (const char* series : {"fields", "cells", "cell_series"}) {
+  for (const char* series : {"fields", "cells", "cell_series", "bodies"}) {
     const auto inner = fs::path(folder) / series;
     if (!fs::is_directory(inner, ignored)) continue;
     std::vector<fs::path> files;

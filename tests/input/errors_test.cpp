@@ -320,8 +320,12 @@ TEST_CASE("cells and bodies are checked") {
   REQUIRE(body("shape = \"file\"\nfile = \"" + surface + "\"\nscale = 0.001\nrecenter = true\naxis = [0, 1, 0]") == "accepted");
   fs::remove(surface);
   require_parts(body("shape = \"sphere\"\nradius_um = 1\n[coupling]"), {":14: coupling: there are no [[cells]]"});
-  require_parts(body("shape = \"sphere\"\nradius_um = 1\n[[cells]]\ncenter_um = [2, 2, 2]\n[coupling]\nscheme = \"force\""),
-                {"bodies: there are no rigid bodies beside membranes"});
+  const std::string beside = "shape = \"sphere\"\nradius_um = 1\n[[cells]]\ncenter_um = [2, 2, 2]\n[coupling]\nscheme = \"force\"";
+  REQUIRE(body(beside + "\n[contact]") == "accepted");
+  require_parts(body(beside), {"bodies: ", "add [contact]"});
+  require_parts(body(beside + "\n[contact]\n[blood]"), {"blood: ", "without obstacles", "[[bodies]]"});
+  require_parts(body(beside + "\n[contact]\n[[cell_types]]\nname = \"red\"\n[[populations]]\ntype = \"red\"\ncount = 2"),
+                {"populations: ", "not packed around rigid bodies", "[[cells]]"});
 }
 
 TEST_CASE("shapes, laws and resting states of cells take their own keys only") {

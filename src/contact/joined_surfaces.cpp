@@ -1,0 +1,107 @@
+#include "contact/joined_surfaces.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "cells/topology.hpp"
+#include "contact/join_positions.hpp"
+#include "membrane/interface.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+std::vector<int> values_of(const Array<int>& view, int count) {
+  const auto part = Kokkos::subview(view, std::make_pair(0, count));
+  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), part);
+  return {host.data(), host.data() + count};
+}
+
+void fill(const Array<int>& view, const std::vector<int>& values) {
+  const auto part = Kokkos::subview(view, std::make_pair(std::size_t(0), values.size()));
+  const auto host = Kokkos::create_mirror_view(part);
+  std::copy(values.begin(), values.end(), host.data());
+  Kokkos::deep_copy(part, host);
+}
+
+/// Some to spare, so that arrays are seldom too small.
+template <class View, class... Columns>
+void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
+  if (view.data() && view.extent(0) >= rows) return;
+  view = View();  // free before taking more
+  view = View(uninitialised(std::string("corpuscle::contact::joined_") + name), rows + rows / 64 + 1, columns...);
+}
+
+std::vector<int> differences(const std::vector<int>& first) {
+  std::vector<int> counts;
+  for (std::size_t b = 0; b + 1 < first.size(); ++b) counts.push_back(first[b + 1] - first[b]);
+  return counts;
+}
+
+}  // namespace
+
+JoinedSurfaces::JoinedSurfaces(const SurfaceSet& rigid, const std::vector<std::pair<int, Vec3>>& images) : rigid_(rigid) {
+  rigid_vertices_ = differences(values_of(rigid.first_vertex, rigid.bodies + 1));
+  rigid_triangles_ = differences(values_of(rigid.first_triangle, rigid.bodies + 1));
+  image_body_ = Array<int>("corpuscle::contact::image_body", images.size() + 1);
+  image_shift_ = Table<double>("corpuscle::contact::image_shift", images.size() + 1, 3);
+  const auto shift = Kokkos::create_mirror_view(image_shift_);
+  for (std::size_t m = 0; m < images.size(); ++m) {
+    body_.push_back(images[m].first);
+    for (int d = 0; d < 3; ++d) shift(m, d) = images[m].second[d];
+  }
+  Kokkos::deep_copy(image_shift_, shift);
+  fill(image_body_, body_);
+}
+
+void JoinedSurfaces::make_room() {
+  const std::size_t vertices = set_.vertices, triangles = set_.triangles, bodies = set_.bodies;
+  grow(set_.x, "x", vertices, 3);
+  grow(set_.v, "v", vertices, 3);
+  grow(set_.vertex_body, "vertex_body", vertices);
+  grow(set_.ring_start, "ring_start", vertices + 1);
+  grow(set_.triangle, "triangle", triangles, 3);
+  grow(set_.neighbour, "neighbour", triangles, 3);
+  grow(set_.triangle_body, "triangle_body", triangles);
+  grow(set_.ring_triangle, "ring_triangle", 3 * triangles);
+  grow(set_.ring_corner, "ring_corner", 3 * triangles);
+  grow(set_.first_vertex, "first_vertex", bodies + 1);
+  grow(set_.first_triangle, "first_triangle", bodies + 1);
+  grow(set_.number, "number", bodies);
+  grow(type_, "type", bodies);
+}
+
+void JoinedSurfaces::take_up(const SurfaceSet& cells, const SurfaceSet& templates, const Array<int>& type) {
+  std::vector<int> first_vertex = values_of(cells.first_vertex, cells.bodies + 1),
+                   first_triangle = values_of(cells.first_triangle, cells.bodies + 1), number = values_of(cells.number, cells.bodies),
+                   types = values_of(type, cells.bodies);
+  for (const int body : body_) {
+    first_vertex.push_back(first_vertex.back() + rigid_vertices_[body]);
+    first_triangle.push_back(first_triangle.back() + rigid_triangles_[body]);
+    number.push_back(body);
+    types.push_back(body);
+  }
+  set_.bodies = static_cast<int>(number.size());
+  set_.cells = cells.cells;
+  set_.own_cells = cells.own_cells;
+  set_.own_vertices = cells.own_vertices;
+  set_.vertices = first_vertex.back();
+  set_.triangles = first_triangle.back();
+  set_.names = cells.names;
+  make_room();
+  fill(set_.first_vertex, first_vertex);
+  fill(set_.first_triangle, first_triangle);
+  fill(set_.number, number);
+  fill(type_, types);
+  if (set_.cells > 0) fill_topology(templates, type_, set_, 0, set_.cells);
+  if (set_.bodies > set_.cells) fill_topology(rigid_, type_, set_, set_.cells, set_.bodies);
+  update(cells);
+}
+
+void JoinedSurfaces::update(const SurfaceSet& cells) const {
+  join_positions(cells, rigid_, {image_body_, image_shift_}, set_);
+}
+
+void JoinedSurfaces::give_back(const SurfaceSet& cells) const { copy_vertices(cells.own_vertices, set_.x, cells.x); }
+
+}  // namespace corpuscle
