@@ -76,16 +76,14 @@ KOKKOS_INLINE_FUNCTION double inclination_deg(const double (&second)[3][3], cons
   return begin_aslant(0.5 * to_degrees * std::atan2(twice_mixed, along - beside), 180);
 }
 
-/// Angle in that plane of the first of the cell's own z, x and y axes that has a part of more than a half in it, as the
-/// rotation has carried it: a turn in the plane changes no such part, so that the choice stays.
+/// Angle in that plane to which the rotation has carried the cell: that of the sum of its own z axis' part there and, turned back by a
+/// right angle, half of its x axis'. So it is the z axis' wherever that is in the plane; a turn in the plane adds what it turns by; and
+/// it goes on without a jump where the z axis leaves the plane. No angle can do so everywhere: this one has no meaning where the z axis
+/// is 30 degrees from the plane's normal and the x axis at a right angle to both, on one side.
 KOKKOS_INLINE_FUNCTION double axis_angle_deg(const Vec3 (&rotation)[3], const Vec3& flow, const Vec3& across) {
-  constexpr double to_degrees = 180 / 3.14159265358979323846;
-  for (int n = 0; n < 3; ++n) {
-    const Vec3& axis = rotation[(n + 2) % 3];
-    const double a = dot(axis, flow), b = dot(axis, across);
-    if (a * a + b * b > 0.25) return begin_aslant(to_degrees * std::atan2(b, a), 360);
-  }
-  return 0;
+  constexpr double to_degrees = 180 / 3.14159265358979323846, share = 0.5;
+  const Vec3 &x = rotation[0], &z = rotation[2];
+  return begin_aslant(to_degrees * std::atan2(dot(z, across) - share * dot(x, flow), dot(z, flow) + share * dot(x, across)), 360);
 }
 
 /// The rows of the first `cells` cells. @param table  [cells, ShapeColumn::count]; angles only where the flow is guided

@@ -1,5 +1,6 @@
 #include "app/estimate.hpp"
 
+#include "app/any_cell.hpp"
 #include "core/error.hpp"
 #include "membrane/reference.hpp"
 #include "grid/grid.hpp"
@@ -202,11 +203,11 @@ void require_below(double count, const char* what, const char* remedy, const cha
 /// Bytes on a rank.
 double of_shared_cells(const Case& scene, const SceneSize& size) {
   // Of a vertex and its two triangles: surface, places and markers; of an own one, motion and the room of the forces' parts.
-  double vertex = 310, own = 260;
+  double vertex = 310, own = 236;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
-  if (std::any_of(scene.cells.begin(), scene.cells.end(), viscous)) own += 8 * 2 * 3;  // MembraneViscosity
+  if (any_cell(scene, viscous)) own += 8 * 2 * 3;  // MembraneViscosity
   if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 40;
-  if (scene.contact) vertex += 130 + 4 * 90;  // what contact knows of a vertex, and of some four that it may touch, now and ahead
+  if (scene.contact) vertex += 70 + 4 * 80;  // what contact knows of a vertex, and of some four that it may touch
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }
 
@@ -249,7 +250,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const bool jumps = size.shared && scene.coupling->pressure == CouplingSettings::Pressure::sharp;
   const double transfer = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : 0;                        // Transfer
   const double search = transfer + ((size.shared ? size.rigid > 0 : surfaces) ? 51 : 0);            // ImmersedBoundary
-  const bool ratios = std::any_of(scene.cells.begin(), scene.cells.end(), [](const auto& c) { return c.viscosity_ratio != 1; });
+  const bool ratios = any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 3 * 24 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid

@@ -1,5 +1,6 @@
 #include "app/modules.hpp"
 
+#include "app/any_cell.hpp"
 #include "core/log.hpp"
 #include "grid/index_space.hpp"
 #include "output/report.hpp"
@@ -19,14 +20,6 @@ std::optional<double> padded_nodes(const Case& scene) {
   double nodes = 1;
   for (int n : scene.grid->nodes) nodes *= n - 1 + 2 * IndexSpace::halo;
   return nodes;
-}
-
-/// Of any cell, placed or yet to be packed.
-template <class Property>
-bool any_cell(const Case& scene, const Property& has) {
-  return std::any_of(scene.cells.begin(), scene.cells.end(), has) ||
-         std::any_of(scene.populations.begin(), scene.populations.end(),
-                     [&](const PopulationSettings& p) { return has(scene.cell_types[p.type].cell); });
 }
 
 bool as_forces(const Case& scene) {

@@ -115,6 +115,16 @@ TEST_CASE("a rank's memory for cells is that of its share") {
   CHECK(corpuscle::measure_scene(scene, 4).own == one.vertices);  // every rank has every cell
 }
 
+TEST_CASE("what cells take is announced for packed ones as for those that are listed") {
+  const auto mb = [](const Words& more) {
+    const Case scene = corpuscle::read_case(app::scene("blood_shear"), more);
+    return corpuscle::estimate_memory(scene, corpuscle::measure_scene(scene, 1), 1);
+  };
+  const auto plain = mb({}), thick = mb({"cell_types.0.viscosity_ratio=5"}), stiff = mb({"cell_types.0.membrane_viscosity_N_s_per_m=5e-7"});
+  CHECK(thick.fields > 1.1 * plain.fields);  // a viscosity that varies takes a field, and a hierarchy of its own
+  CHECK(stiff.surfaces > 1.02 * plain.surfaces);
+}
+
 TEST_CASE("a scene that does not fit is refused at once") {
   const auto folder = fresh_folder("too_large");
   for (const char* nodes : {"[2000,2000,2000]", "[20000,20000,20000]", "[100000,100000,100000]"})
