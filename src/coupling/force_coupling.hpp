@@ -56,6 +56,8 @@ class ForceCoupling : public Coupling {
   void take_places(const Case& scene, const PackedCells* packed, double contact_um);
   void check_packing();
   void warn_of_image() const;
+  void warn_of_walls() const;
+  void warn_of_pressed_start() const;
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);

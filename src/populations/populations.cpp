@@ -162,6 +162,7 @@ class Packer {
     std::vector<int> placed(types_.size(), 0);
     for (const PackedBody& body : packing.bodies())
       if (body.movable) ++placed[body.group];
+    if (std::all_of(placed.begin(), placed.end(), [](int n) { return n == 0; }) && scene_.cells.empty()) refuse_all();
     std::string text;
     double asked = 0, reached = 0;
     for (std::size_t p = 0; p < types_.size(); ++p) {
@@ -177,6 +178,19 @@ class Packer {
                             may_deform() ? "also as membranes they would have to be much smaller"
                             : scene_.contact ? "beside [[cells]] they keep the shape that they have at rest"
                                              : "they keep the shape that they have at rest: with [contact] they would bend"));
+  }
+
+  /// Where not one cell has room, fewer of them are no remedy.
+  [[noreturn]] void refuse_all() const {
+    const PopulationSettings& population = scene_.populations[0];
+    const double wide = 2 * shapes_[types_[0]].radius();
+    const double room = (may_deform() ? least_size : 1.0) * wide + 2 * population.gap_um;
+    throw InputError(fmt::format("{}: not even one of its cells fits: they are {:.3g} um wide at rest, and {} need about {:.2g} um across: use "
+                                 "a wider grid{}, a smaller gap_um, or smaller cells (cell_types.{}){}",
+                                 amount(population, 0), wide,
+                                 may_deform() ? fmt::format("as membranes, which grow from {:g} of their size,", least_size) : "in that shape",
+                                 room, scene_.grid->diameter_um > 0 ? fmt::format(" (grid.diameter_um, now {:g})", scene_.grid->diameter_um) : "",
+                                 population.type, may_deform() ? "" : ", or add [contact], with which they bend"));
   }
 
   static constexpr double most_share = 0.75, least_size = 0.75;
@@ -199,6 +213,9 @@ int population_count(const PopulationSettings& population, int number, double fl
   const double cells = population.hematocrit * fluid_volume / cell_volume;
   if (cells > 1e8) throw InputError(fmt::format("{}: {:.2g} cells: is the grid in um?", amount(population, number), cells));
   const int count = static_cast<int>(std::floor(cells + 0.5 + 1e-9));
+  if (cell_volume > fluid_volume)
+    throw InputError(fmt::format("{}: one cell has {:.3g} um3 and the whole grid {:.3g} um3: use a larger grid, or smaller cells",
+                                 amount(population, number), cell_volume, fluid_volume));
   if (count < 1)
     throw InputError(fmt::format("{}: less than half a cell: one has {:.3g} um3, {:.3g} of the fluid's volume; ask for more, or set count",
                                  amount(population, number), cell_volume, cell_volume / fluid_volume));
