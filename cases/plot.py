@@ -184,6 +184,24 @@ def read_history(path):
     return history
 
 
+def draw_course(axis, times, values, name):
+    """A line over time, broken where an angle comes back at the other end of its range."""
+    if name.endswith("_deg") and len(values) > 1:
+        turns = np.flatnonzero(np.abs(np.diff(values)) > 90) + 1
+        times, values = np.insert(times, turns, np.nan), np.insert(values, turns, np.nan)
+    axis.plot(times, values, linewidth=1)
+
+
+def level(axis):
+    """What next to nothing changes is drawn level: its digits would fill the panel."""
+    values = np.concatenate([line.get_ydata() for line in axis.lines])
+    values = values[np.isfinite(values)]
+    size = np.abs(values).max(initial=0)
+    if values.size and np.ptp(values) < 1e-5 * size:
+        axis.set_ylim(values.min() - 0.1 * size, values.max() + 0.1 * size)
+    axis.ticklabel_format(useOffset=False)
+
+
 def plot_history(history, out):
     """One panel for each column that has values and changes with time, one line for each cell."""
     numbers = np.unique(history["cell"][~np.isnan(history["cell"])])
@@ -196,9 +214,9 @@ def plot_history(history, out):
     for axis, name in zip(axes.flat, names):
         for number in numbers if numbers.size else [np.nan]:
             mine = np.isnan(history["cell"]) if np.isnan(number) else history["cell"] == number
-            axis.plot(history["time_us"][mine], history[name][mine], linewidth=1)
+            draw_course(axis, history["time_us"][mine], history[name][mine], name)
         axis.set_title(name, fontsize=9)
-        axis.ticklabel_format(useOffset=False)
+        level(axis)
     for axis in axes.flat[len(names) :]:
         axis.set_visible(False)
     figure.supxlabel("time, us")
@@ -251,17 +269,18 @@ def plot_blood(path, out):
         middle = 0.5 * (edges[1:] + edges[:-1])
         for name, unit, places in (("hematocrit", "", middle), ("velocity", "_mm_per_s", profile["velocity_um"])):
             axis = next(left)
-            axis.errorbar(places, profile[name + unit], profile[f"{name}_error{unit}"], fmt="o-", capsize=2, markersize=3)
+            bars = np.nan_to_num(profile[f"{name}_error{unit}"])  # where it is not known, none
+            axis.errorbar(places, profile[name + unit], bars, fmt="o-", capsize=2, markersize=3)
             axis.set_xlim(edges[0], edges[-1])
             axis.set_ylim(bottom=min(0, np.nanmin(profile[name + unit])))
             axis.set_xlabel(across + ", um")
             axis.set_title(name + (", mm/s" if unit else ""), fontsize=9)
     for name in names:
         axis = next(left)
-        axis.plot(samples["time_us"], samples[name], linewidth=1)
+        draw_course(axis, samples["time_us"], samples[name], name)
         axis.set_xlabel("time, us")
         axis.set_title(name, fontsize=9)
-        axis.ticklabel_format(useOffset=False)
+        level(axis)
     for axis in left:
         axis.set_visible(False)
     save(figure, out / "blood.png")

@@ -33,7 +33,7 @@ CoarserRun doubled_spacing(const Case& scene) {
     if (nodes[d] < scene.grid->nodes[d]) ratio = std::min(ratio, double(cells) / (nodes[d] - 1));
   }
   if (nodes == scene.grid->nodes) refuse("spacing", "the grid has no more than the 4 nodes that are needed");
-  CoarserRun run{"spacing", ratio, {}, {}};
+  CoarserRun run{"spacing", ratio, {}, {}, {}};
   run.overrides.push_back(fmt::format("grid.nodes=[{},{},{}]", nodes[0], nodes[1], nodes[2]));
   return run;
 }
@@ -50,12 +50,12 @@ CoarserRun longer_step(const Case& scene) {
     if (scene.time.first_step_us > 0) overrides.push_back(fmt::format("time.first_step_us={:.15g}", scene.time.first_step_us * factor));
     return overrides;
   };
-  return {"step", double(ratio), steps_times(static_cast<double>(ratio)), steps_times(0.5)};
+  return {"step", double(ratio), steps_times(static_cast<double>(ratio)), steps_times(0.5), {}};
 }
 
 CoarserRun fewer_vertices(const Case& scene) {
   if (scene.cells.empty()) refuse("vertices", "this scene has no [[cells]]; use --estimate-error=spacing,step");
-  CoarserRun run{"vertices", std::sqrt(2.0), {}, {}};
+  CoarserRun run{"vertices", std::sqrt(2.0), {}, {}, {}};
   std::set<std::string> coarsened;  // cells of one type share a key
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const auto& cell = scene.cells[c];
@@ -69,26 +69,43 @@ CoarserRun fewer_vertices(const Case& scene) {
   return run;
 }
 
+/// Packed on another grid or with other meshes, cells start elsewhere.
+void refuse_packing_anew(const Case& scene, const char* kind) {
+  if (!scene.populations.empty())
+    refuse(kind, "populations would be packed anew, and the runs differ from their start; use --estimate-error=step");
+}
+
+/// Of the kinds that the scene has something of; those that cannot be had say why.
+std::vector<CoarserRun> all_runs(const Case& scene) {
+  std::vector<CoarserRun> runs;
+  bool any = false;
+  const auto take = [&](bool has, const char* kind, CoarserRun (*make)(const Case&)) {
+    if (!has) return;
+    try {
+      if (kind != std::string_view("step")) refuse_packing_anew(scene, kind);
+      runs.push_back(make(scene));
+      any = true;
+    } catch (const InputError& error) {
+      CoarserRun none;
+      none.kind = kind;
+      none.refused = error.what();
+      runs.push_back(none);
+    }
+  };
+  take(scene.grid.has_value(), "spacing", doubled_spacing);
+  take(scene.fluid.has_value(), "step", longer_step);
+  take(scene.has_cells(), "vertices", fewer_vertices);
+  if (!any) refuse("all", "nothing of this scene can be coarsened");
+  return runs;
+}
+
 }  // namespace
 
 std::vector<CoarserRun> coarser_runs(const Case& scene, const std::string& kinds) {
+  if (kinds == "all") return all_runs(scene);
   std::vector<CoarserRun> runs;
-  if (!scene.populations.empty()) {  // packed on another grid or with other meshes, cells start elsewhere
-    if (kinds == "all") return {longer_step(scene)};
-    for (const char* kind : {"spacing", "vertices"})
-      if (kinds.find(kind) != std::string::npos)
-        refuse(kind, "populations would be packed anew, and the runs differ from their start; use --estimate-error=step");
-  }
-  if (kinds == "all") {
-    if (scene.grid && scene.grid->generator != GridSettings::Generator::file) runs.push_back(doubled_spacing(scene));
-    if (scene.fluid) runs.push_back(longer_step(scene));
-    const bool coarser_meshes = std::all_of(scene.cells.begin(), scene.cells.end(), [](const CellSettings& cell) {
-      return cell.mesh.empty() && cell.vertices > fewest_vertices(cell);
-    });
-    if (!scene.cells.empty() && coarser_meshes) runs.push_back(fewer_vertices(scene));
-    if (runs.empty()) refuse("all", "nothing of this scene can be coarsened");
-    return runs;
-  }
+  for (const char* kind : {"spacing", "vertices"})
+    if (kinds.find(kind) != std::string::npos) refuse_packing_anew(scene, kind);
   std::stringstream list(kinds);
   for (std::string kind; std::getline(list, kind, ',');) {
     if (std::any_of(runs.begin(), runs.end(), [&](const CoarserRun& run) { return run.kind == kind; })) continue;
@@ -119,7 +136,7 @@ void add_error_bars(Report& report, const CoarserRun& run, const Report& coarser
   report.extra["error_estimate"].push_back(entry);
 }
 
-CoarserRun halved_run(const CoarserRun& run) { return {run.kind, 0.5, run.halved, {}}; }
+CoarserRun halved_run(const CoarserRun& run) { return {run.kind, 0.5, run.halved, {}, {}}; }
 
 void note_missing_bars(Report& report, const CoarserRun& run, const std::string& reason) {
   report.extra["error_estimate"].push_back({{"coarser", run.kind}, {"ratio", run.ratio}, {"failed", reason}});

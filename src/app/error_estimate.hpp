@@ -15,6 +15,7 @@ struct CoarserRun {
   double ratio = 2;                    // of grid spacings, steps or edge lengths, to those of the main run
   std::vector<std::string> overrides;  // section.key=value, on top of the main run's
   std::vector<std::string> halved;     // of steps: those of a finer run, should this one not be possible; else none
+  std::string refused;                 // why there is no such run of this scene; else ""
 };
 /// In place of one that is not possible.
 CoarserRun halved_run(const CoarserRun& run);

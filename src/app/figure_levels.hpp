@@ -14,6 +14,7 @@ struct FigureScales {
   double energy_fJ = 0;        // the largest term of the energy balance
   bool convection_left_out = false;
   bool stretching = false;  // no flow: a cell pulled at its ends
+  bool forces = false;      // membranes are forces
 };
 
 /// The warnings of a report, an array: each has the `figure`, its `value`, the `level`, the `key` of the case file that

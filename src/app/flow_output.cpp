@@ -288,12 +288,21 @@ void FlowOutput::fill_blood(Report& report, const ContactReport& contact) const 
   report.extra["blood"] = block;
 }
 
+/// So that a comparison of runs gives bars to them.
+void FlowOutput::fill_blood_quantities(Report& report) const {
+  if (!blood_) return;
+  const auto& block = report.extra["blood"];
+  for (const char* name : {"mean_speed_mm_per_s", "cell_speed_mm_per_s", "discharge_hematocrit", "relative_apparent_viscosity", "cell_free_layer_um"})
+    if (block.contains(name)) report.quantities[std::string("blood_") + name] = block[name];
+}
+
 void FlowOutput::fill(Report& report) {
   const RunTotals totals = totals_now();
   fill_totals(report, totals);
   fill_blood(report, totals.contact);
   if (blood_) blood_files_->write_profile(*blood_, simulation_.time());
   report_state(record(), report);
+  fill_blood_quantities(report);
 }
 
 }  // namespace corpuscle

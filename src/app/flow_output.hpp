@@ -57,6 +57,7 @@ class FlowOutput {
   FlowRecord record() const;
   void fill_totals(Report& report, RunTotals now) const;
   void fill_blood(Report& report, const ContactReport& contact) const;
+  void fill_blood_quantities(Report& report) const;
 
   std::string folder_, run_, files_;
   Case scene_;

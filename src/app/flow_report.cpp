@@ -102,6 +102,19 @@ void report_contact(FlowSimulation& simulation, const RunTotals& now, Report& re
     report.extra["contact"][name] = gap < 1e30 ? nlohmann::json(gap) : nlohmann::json();
 }
 
+/// Where cells have types, their constants are keys of those.
+void name_types(const Case& scene, nlohmann::json& warnings) {
+  if (scene.cell_types.empty()) return;
+  const std::string named = "cells.0.", right = "cell_types.0.";
+  for (auto& warning : warnings)
+    for (const char* entry : {"key", "message"}) {
+      std::string text = warning[entry];
+      for (std::size_t at = text.find(named); at != std::string::npos; at = text.find(named, at + right.size()))
+        text.replace(at, named.size(), right);
+      warning[entry] = text;
+    }
+}
+
 }  // namespace
 
 void report_totals(const FlowRecord& record, const RunTotals& now, Report& report) {
@@ -138,7 +151,9 @@ void report_totals(const FlowRecord& record, const RunTotals& now, Report& repor
 
 void judge_figures(const FlowRecord& record, Report& report) {
   report.warnings = judge(report.errors, {record.simulation.fluid().statistics().reference_speed, record.energy.largest_fJ(),
-                                          record.scene.fluid->convection == FluidSettings::Convection::none});
+                                          record.scene.fluid->convection == FluidSettings::Convection::none, false,
+                                          record.simulation.shared_cells() != nullptr});
+  name_types(record.scene, report.warnings);
 }
 
 void report_state(const FlowRecord& record, Report& report) {

@@ -11,7 +11,9 @@ const PackingReport* packing_of(FlowSimulation& simulation) {
   return simulation.coupling() ? simulation.coupling()->packing() : nullptr;
 }
 
-std::string gap_text(double gap) { return gap < 1e29 ? fmt::format("{:.3g} um", gap) : "far"; }
+std::string gap_text(double gap, double seen) {
+  return gap < 1e29 ? fmt::format("{:.3g} um", gap) : fmt::format("more than {:.3g} um", seen);
+}
 
 }  // namespace
 
@@ -24,7 +26,7 @@ void print_packing(FlowSimulation& simulation) {
          one.asked > 0 ? fmt::format(" (asked for {:g})", one.asked) : "");
   }
   if (packing->smallest_gap_um > 0) info("packing:  tube hematocrit {:.4f}; smallest gap between cells {}, to the sides of the grid {}", packing->tube_hematocrit,
-       gap_text(packing->smallest_gap_um), gap_text(packing->smallest_wall_gap_um));
+       gap_text(packing->smallest_gap_um, packing->gaps_seen_um), gap_text(packing->smallest_wall_gap_um, packing->gaps_seen_um));
 }
 
 void fill_packing(Report& report, FlowSimulation& simulation) {

@@ -125,8 +125,8 @@ ExitCode compare(const Comm& comm, const Bars& bars, const CoarserRun& run, cons
 ExitCode estimate_errors(const Comm& comm, const Bars& bars, const Place& main, Report& report) {
   ExitCode code = exit_done;
   for (const auto& run : bars.runs) {
-    std::string reason;
-    code = compare(comm, bars, run, main, report, reason);
+    std::string reason = run.refused;
+    if (reason.empty()) code = compare(comm, bars, run, main, report, reason);
     if (!reason.empty() && code != exit_stopped && !run.halved.empty()) {
       info("error bars: no longer step: {}", reason);
       code = compare(comm, bars, halved_run(run), main, report, reason);

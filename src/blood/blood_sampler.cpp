@@ -269,9 +269,10 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
                                        : by_walls()                   ? "the walls were at rest at all samples"
                                                                       : "nothing flowed");
   leave("cell_free_layer_um", frame_.guided() ? "there was no cell along the flow at any sample"
+                              : flow_ && flow_->duct >= 0 ? "between four walls it is not measured"
                               : flow_         ? "the flow has no walls to the sides"
                                               : undriven);
-  leave("smallest_gap_um", "there is no [contact], or nothing came near");
+  leave("smallest_gap_um", simulation_.coupling()->contact_report() ? "nothing came within reach of the contact" : "there is no [contact]");
   leave("crossings", "there is no [contact]");
   if (missing.empty()) block.erase("left_out");
 }
@@ -337,7 +338,9 @@ void BloodSampler::put_steady(nlohmann::json& block) const {
     return;
   }
   block["steady"] = nullptr;
-  block["left_out"]["steady"] = any ? "the samples are too few, or too much alike, to tell a drift from chance" : "nothing flows";
+  block["left_out"]["steady"] = any ? "the samples are too few, or too much alike, to tell a drift from chance"
+                                      : flow_ ? "nothing that could drift has a value"
+                                              : "no figure of a flow has a value: " + no_flow_;
 }
 
 nlohmann::json BloodSampler::report() const {
@@ -362,7 +365,8 @@ nlohmann::json BloodSampler::report() const {
     block["cell_free_layer_is"] = fmt::format(
         "between the wall and the outermost membrane in windows of {:.3g} um along the flow, seen from {} sides; where "
         "there is no "
-        "cell along the flow there is no layer",
+        "cell along the flow there is no layer. It is the mean over all sides: of a cell that is alone in its window it tells how wide "
+        "the cell is, wherever it is; how near cells come to the wall is contact.smallest_gap_to_walls_um",
         frame_.length / windows_, view_count(frame_));
   put_steady(block);
   block["errors_are"] = fmt::format(

@@ -116,6 +116,41 @@ Vec3 shear_of_walls(const Case& scene, int d) {
   return shear;
 }
 
+/// Between four walls there is no one direction across, but there is one along.
+std::optional<GuidedFlow> duct_flow(const Case& scene, FluidSolver& fluid) {
+  int along = -1, walls = 0;
+  for (int s = 0; s < 6; ++s) {
+    const BoundarySettings& side = side_of(scene, s);
+    if (side.type == Type::moving_wall) return std::nullopt;
+    walls += is_wall(side);
+    if (!is_wall(side) && s % 2 == 0 && !is_wall(side_of(scene, s + 1))) along = s / 2;
+  }
+  if (walls != 4 || along < 0) return std::nullopt;
+  GuidedFlow flow;
+  FlowFrame& frame = flow.frame;
+  const Triple &lower = scene.grid->lower_um, &upper = scene.grid->upper_um;
+  const Vec3 down = drive(scene, fluid, Vec3{});
+  if (down[along] == 0) return std::nullopt;
+  frame.origin = to_vec3(lower);
+  frame.tangent[along] = down[along] > 0 ? 1 : -1;
+  frame.station_axis[along] = 1;
+  frame.normal = any_across(frame.tangent);
+  frame.length = upper[along] - lower[along];
+  frame.periodic = fluid.grid().index().periodic[along];
+  frame.width = 1e300;
+  for (int d = 0; d < 3; ++d)
+    if (d != along) frame.width = std::min(frame.width, upper[d] - lower[d]);
+  complete(frame);
+  flow.duct = along;
+  flow.driven = true;
+  flow.gradient = -dot(fluid.imposed_gradient(), frame.tangent);
+  if (!frame.periodic || flow.gradient == 0) {
+    flow.gradient = 0;
+    flow.no_viscosity = "no pressure gradient is imposed";
+  }
+  return flow;
+}
+
 std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
   int pairs = 0, d = -1, walls = 0;
   for (int e = 0; e < 3; ++e) {
@@ -123,8 +158,7 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
     walls += low + high;
     if (low && high) ++pairs, d = e;
   }
-  if (walls > 0 && (pairs != 1 || walls != 2))
-    return std::nullopt;  // ducts and boxes with a lid have no one direction across
+  if (walls > 0 && (pairs != 1 || walls != 2)) return duct_flow(scene, fluid);
   GuidedFlow flow;
   FlowFrame& frame = flow.frame;
   const Triple &lower = scene.grid->lower_um, &upper = scene.grid->upper_um;
@@ -186,7 +220,7 @@ std::string why_unguided(const Case& scene) {
     const bool low = is_wall(side_of(scene, 2 * e)), high = is_wall(side_of(scene, 2 * e + 1));
     walls += low + high, pairs += low && high;
   }
-  if (walls > 0 && (pairs != 1 || walls != 2)) return "there are walls on other sides than two that face each other";
+  if (walls > 0 && (pairs != 1 || walls != 2) && (pairs != 2 || walls != 4)) return "there are walls on other sides than two that face each other";
   return "there is no pressure gradient, no inlet, and no wall that moves along another";
 }
 
@@ -196,7 +230,7 @@ double plasma_speed(const Case& scene, const GuidedFlow& flow) {
   std::array<bool, 3> periodic{};
   for (int d = 0; d < 3; ++d) {
     periodic[d] = side_of(scene, 2 * d).type == Type::periodic;
-    if (d == flow.across || (flow.frame.tube() && d < 2)) continue;
+    if (d == flow.across || (flow.frame.tube() && d < 2) || (flow.duct >= 0 && d != flow.duct)) continue;
     const double share = static_cast<double>(along) / (piece.nodes[d] - 1);
     piece.nodes[d] = along + 1;
     if (flow.frame.tube())

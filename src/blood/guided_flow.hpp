@@ -16,6 +16,7 @@ struct GuidedFlow {
   bool sheared = false;      // by walls that move past each other along it, and by nothing else
   double gradient = 0;       // kPa/um, imposed along the tangent, where plasma alone would flow steadily; 0: not so
   int across = -1;           // between walls: direction of the grid from one to the other
+  int duct = -1;             // between four walls: direction of the grid along them
   int wall[2] = {-1, -1};    // sheared: entries of the two walls in the case
   std::string no_viscosity;  // why there is no relative viscosity
 };

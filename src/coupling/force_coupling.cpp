@@ -122,7 +122,9 @@ void ForceCoupling::check_all_at_home(double time) {
     for (int v = 0; v < surfaces().own_vertices; ++v)
       if (host(v, 0) != 1)
         throw ComputationError(
-            host(v, 0) == 0
+            host(v, 0) == 0 && time == 0
+                ? fmt::format("{} is outside the grid at the start: move the cell (center_um), or use a larger grid", vertex_text(v))
+            : host(v, 0) == 0
                 ? fmt::format("{} is outside the grid at {:.6g} us. Likely cause: a cell pressed against a wall, where nothing but the "
                               "flow keeps it away, or a step too long; reduce time.step_us or move the cell (center_um)",
                               vertex_text(v), time)
@@ -200,9 +202,9 @@ void ForceCoupling::check_start() {
   if (outflow_.distance < outflow_limit_) {
     outflow_limit_ = 0.5 * outflow_.distance;
     warn(
-        "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left; move the cell (center_um) or "
+        "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left instead of time.stop_before_outflow_um = {:g}; move the cell (center_um) or "
         "lengthen the grid",
-        nearest_outflow(), outflow_limit_);
+        nearest_outflow(), outflow_limit_, scene_.time.stop_before_outflow_um);
   }
   warn_of_image();
   if (packing_ && !small_) check_packing();
@@ -210,6 +212,8 @@ void ForceCoupling::check_start() {
   find_softest();
   if (loads_) loads_->look_at_start(lengths_us_.front());
   if (small_) return membranes_->rest_at_size(1);
+  warn_of_walls();
+  warn_of_pressed_start();
   refuse_long_steps();
 }
 

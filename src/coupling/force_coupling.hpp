@@ -64,6 +64,8 @@ class ForceCoupling : public Coupling {
   std::array<double, 5> load_beside(int body) const;
   double loss_beside_bodies() const;
   void warn_of_image() const;
+  void warn_of_walls() const;
+  void warn_of_pressed_start() const;
   void inflate();
   void settle_membranes(double size, double& mobility, long step);
   void place(double time_us);

@@ -56,7 +56,9 @@ double least_gap_of_packed(const SurfaceSet& set, const ContactLists& lists, con
   return least;
 }
 
-std::string gap_text(double gap) { return gap < 1e29 ? fmt::format("{:.3g} um", gap) : "far"; }
+std::string gap_text(double gap, double seen) {
+  return gap < 1e29 ? fmt::format("{:.3g} um", gap) : fmt::format("more than {:.3g} um", seen);
+}
 
 }  // namespace
 
@@ -90,6 +92,7 @@ void ForceCoupling::check_packing() {
   Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
   contact.take_up(surfaces(), membranes_->templates(), membranes_->views().type);
   contact.look_at_start(lengths_us_.front());
+  packing_->gaps_seen_um = settings.range_um;
   packing_->smallest_gap_um =
       comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
   WallSides sides;
@@ -104,8 +107,8 @@ void ForceCoupling::check_packing() {
   if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
   throw InputError(fmt::format("populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "
                                "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
-                               gap_text(packing_->smallest_gap_um),
-                               gap_text(packing_->smallest_wall_gap_um), packed_gap_));
+                               gap_text(packing_->smallest_gap_um, settings.range_um),
+                               gap_text(packing_->smallest_wall_gap_um, settings.range_um), packed_gap_));
 }
 
 /// Where shapes at rest have no room, membranes grow to their size from the largest that have, as contact and their own forces

@@ -69,6 +69,10 @@ void check_force_scheme(const Case& scene, const Complaint& complain) {
 /// Cells that the program places.
 void check_populations(const Case& scene, const Complaint& complain) {
   for (std::size_t p = 0; p < scene.populations.size(); ++p) {
+    const CellSettings& cell = scene.cell_types[scene.populations[p].type].cell;
+    if (!cell.mesh.empty() && !cell.recenter)
+      complain(fmt::format("cell_types.{}", cell.type), "recenter",
+               fmt::format("populations.{} places its cells by the centroid of their volume: set it to true, or leave it out", p));
     if (scene.coupling->scheme != CouplingSettings::Scheme::force)
       complain(fmt::format("populations.{}", p), "",
                "cells are packed only as membranes that are forces: set coupling.scheme = \"force\", or place them one by one in [[cells]]");

@@ -1,6 +1,7 @@
 // Parses a case file, hands its sections to their readers and checks the whole. flow_sections.cpp and body_sections.cpp
 // read the keys, section.cpp checks types and ranges, case_checks.cpp what spans several sections.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -49,12 +50,15 @@ class CaseReader {
     check_modules(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     if (scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force) {
       note_without_effect(scene);
+      drop_volume_modulus(scene);
       note_without_contact(scene);
     }
+    note_unused_types(scene);
     read_time_section(scene);
     check_sampling(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = scene.has_cells() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
+    note_often_history(scene);
     scene.resolved = echo_;
     return scene;
   }
@@ -112,13 +116,70 @@ class CaseReader {
     }
     if (!root_.contains("time"))
       throw InputError(source_.file + ": section [time] is missing; it needs step_us and end_us");
-    scene.time = one<TimeSettings>("time", read_time);
+    scene.time = one<TimeSettings>("time", [&](Section& s) { return read_time(s, follows_late(scene)); });
+    note_time_without_effect(scene);
+  }
+
+  /// What resists in a step is what the fluid did in the last one: of a load that comes at once some would be left to the fluid alone.
+  static bool follows_late(const Case& scene) {
+    if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force) return false;
+    constexpr double little = 2e-8;  // N s/m: about what the fluid around a cell resists
+    const auto viscous = [](const CellSettings& cell) { return cell.membrane_viscosity_N_s_per_m > little; };
+    return std::any_of(scene.cells.begin(), scene.cells.end(), viscous) ||
+           std::any_of(scene.populations.begin(), scene.populations.end(),
+                       [&](const PopulationSettings& p) { return viscous(scene.cell_types[p.type].cell); });
+  }
+
+  bool given(const std::string& section, const std::string& key) const {
+    const auto* node = root_.get(section);
+    return node && node->is_table() && node->as_table()->contains(key);
+  }
+
+  /// Keys that are given and mean nothing in this scene: not refused, a case that is changed a little keeps them.
+  void note_time_without_effect(Case& scene) const {
+    const auto note = [&](bool so, const std::string& text) {
+      if (so) scene.remarks.push_back(text);
+    };
+    const TimeSettings& time = scene.time;
+    note(time.first_step_us > time.step_us * (1 + 1e-9),
+         fmt::format("time.first_step_us = {:g} is longer than time.step_us = {:g} and has no effect: no step is longer than that",
+                     time.first_step_us, time.step_us));
+    const bool outflow = std::any_of(scene.boundaries.begin(), scene.boundaries.end(),
+                                     [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::outflow; });
+    note(given("time", "stop_before_outflow_um") && !outflow,
+         fmt::format("time.stop_before_outflow_um = {:g} has no effect: no side is an \"outflow\"", time.stop_before_outflow_um));
+    if (follows_late(scene) && given("time", "first_step_us") && time.first_step_us == 0)
+      note(true, fmt::format("time.first_step_us = 0: with membrane viscosity in a fluid that is everywhere the first steps follow a load "
+                             "late, and what they leave lasts: leave the key out, for first steps of {:g} us, or reduce time.step_us",
+                             time.step_us / 16));
+  }
+
+  static void note_often_history(Case& scene) {
+    const double every = scene.output.history_every_us;
+    const double shortest = scene.time.first_step_us > 0 ? std::min(scene.time.first_step_us, scene.time.step_us) : scene.time.step_us;
+    if (scene.stretching || every == 0 || every >= 0.5 * shortest) return;
+    scene.remarks.push_back(fmt::format("output.history_every_us = {:g} is less than the shortest step, {:g} us: each step is a line, "
+                                        "as with 0", every, shortest));
+  }
+
+  /// Types that no cell is of.
+  void note_unused_types(Case& scene) const {
+    std::vector<std::string> unused;
+    for (std::size_t t = 0; t < scene.cell_types.size(); ++t) {
+      const auto of_it = [&](const auto& cell) { return cell.type == static_cast<int>(t); };
+      if (std::none_of(scene.cells.begin(), scene.cells.end(), of_it) &&
+          std::none_of(scene.populations.begin(), scene.populations.end(), of_it))
+        unused.push_back(fmt::format("cell_types.{} (\"{}\")", t, scene.cell_types[t].name));
+    }
+    if (!unused.empty())
+      scene.remarks.push_back(fmt::format("no cell is of {}: {} no effect", fmt::join(unused, ", "), unused.size() == 1 ? "it has" : "they have"));
   }
 
   /// Keys of cells that membranes as forces have no use for: refused, they would have to be taken out of a case to try it with
   /// this coupling.
   void note_without_effect(Case& scene) const {
     for (const auto& [key, why] : {std::pair{"mass_pg", "membranes have no mass of their own"},
+                                   {"volume_modulus_Pa", "the fluid inside keeps each cell's volume as it is"},
                                    {"interior", "the fluid is inside the cells as well (viscosity_ratio)"}}) {
       std::string first;
       int others = -1;
@@ -133,6 +194,12 @@ class CaseReader {
       scene.remarks.push_back(fmt::format("{}{} has no effect with coupling.scheme = \"force\": {}", first,
                                           others > 0 ? fmt::format(" (and {} more)", others) : "", why));
     }
+  }
+
+  /// A modulus that has nothing to hold would still limit the step.
+  static void drop_volume_modulus(Case& scene) {
+    for (CellTypeSettings& type : scene.cell_types) type.cell.volume_modulus_Pa = 0;
+    for (CellSettings& cell : scene.cells) cell.volume_modulus_Pa = 0;
   }
 
   static void note_without_contact(Case& scene) {

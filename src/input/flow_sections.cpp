@@ -50,11 +50,29 @@ void check_grid(const Section& s, const GridSettings& grid) {
 
 }  // namespace
 
-TimeSettings read_time(Section& s) {
+namespace {
+
+/// Of whole steps, with which those begin that membrane viscosity makes follow a load late.
+constexpr double short_start_share = 1.0 / 16;
+
+double read_first_step(Section& s, const TimeSettings& time, bool short_start) {
+  const std::string key = "first_step_us";
+  Bounds allowed = not_negative();
+  if (s.recording()) {
+    s.describe(key, allowed.text + "; 0: step_us",
+               fmt::format("0, or step_us / {:g} where membranes are forces and have membrane viscosity", 1 / short_start_share));
+    return 0;
+  }
+  return s.number(key, allowed, short_start ? short_start_share * time.step_us : 0.0);
+}
+
+}  // namespace
+
+TimeSettings read_time(Section& s, bool short_start) {
   TimeSettings time;
   time.step_us = s.number("step_us", positive(1e12));
   time.end_us = s.number("end_us", positive(1e15));
-  time.first_step_us = s.number("first_step_us", not_negative(), 0.0);
+  time.first_step_us = read_first_step(s, time, short_start);
   time.stop_before_outflow_um = s.number("stop_before_outflow_um", not_negative(), time.stop_before_outflow_um);
   s.finish();
   if (time.step_us > time.end_us) s.fail("step_us", fmt::format("must not exceed end_us = {}", time.end_us));

@@ -70,7 +70,7 @@ std::vector<KeyRecord> keys_of(const std::string& name, const Read& read) {
 }
 
 Read reader_of(const std::string& name) {
-  if (name == "time") return read_time;
+  if (name == "time") return [](Section& s) { read_time(s); };
   if (name == "grid") return read_grid;
   if (name == "fluid") return read_fluid;
   if (name == "boundary") return read_boundary;

@@ -22,6 +22,7 @@ void read_amount(Section& s, PopulationSettings& p) {
     p.count = s.integer("count", 1, most_cells);
     return;
   }
+  if (!given) return s.require("hematocrit", "a number above 0 and up to 0.8 (share of the fluid's volume), or count: how many cells there are");
   p.hematocrit = s.number("hematocrit", positive(most_hematocrit));
 }
 

@@ -9,7 +9,8 @@ namespace corpuscle {
 constexpr double most_um = 1e7, most_uN_per_m = 1e9, most_J = 1e-9, most_Pa = 1e12, most_N_s_per_m = 1, most_pg = 1e12, most_nN = 1e9;
 constexpr double most_mm_per_s = 1e9, most_rad_per_s = 1e12, most_scale = 1e12;
 
-TimeSettings read_time(Section& s);
+/// @param short_start  the first steps are short unless the case says otherwise
+TimeSettings read_time(Section& s, bool short_start = false);
 GridSettings read_grid(Section& s);
 FluidSettings read_fluid(Section& s);
 BoundarySettings read_boundary(Section& s);

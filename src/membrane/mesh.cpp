@@ -156,6 +156,11 @@ void check_closed_surface(const TriangleMesh& mesh, const std::string& name) {
   check_areas(mesh, name);
   check_edges(mesh, name);
   check_fans(mesh, name);
+  constexpr double flat = 1e-9;  // of a sphere's volume, at least
+  const double size = std::pow(area(mesh), 1.5);
+  if (std::abs(volume(mesh)) <= flat * size)
+    refuse(name, fmt::format("flat: its volume is {:.6g} um3 and its area {:.6g} um2", volume(mesh), area(mesh)),
+           "give a closed surface with room inside");
   if (!(volume(mesh) > 0)) {
     refuse(name, fmt::format("inside-out: its volume is {:.6g} um3", volume(mesh)),
            "reverse the vertex order of every triangle, they must be counter-clockwise seen from outside");

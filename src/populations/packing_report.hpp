@@ -16,6 +16,7 @@ struct PackingReport {
   double tube_hematocrit = 0;    // of all cells of the scene
   double smallest_gap_um = 0;    // between the surfaces of cells, as contact sees them; 1e30: beyond the reach of the search
   double smallest_wall_gap_um = 0;
+  double gaps_seen_um = 0;       // that reach
 };
 
 }  // namespace corpuscle

@@ -45,7 +45,7 @@ class Packer {
   PackedCells pack() {
     count();
     RigidPacking packing(shapes_, start(), space_, scale_);
-    if (!packing.grow() && !(may_deform() && packing.shrink(least_size))) refuse(packing);
+    if (!packing.grow() && !(may_deform() && packing.shrink(least_size()))) refuse(packing);
     PackedCells packed;
     packed.size = packing.scale();
     packed.count = wanted_;
@@ -65,6 +65,12 @@ class Packer {
 
   /// Membranes grow on, and bend, where contact holds them apart; placed cells are not to change.
   bool may_deform() const { return scene_.contact && scene_.cells.empty(); }
+
+  /// From which membranes grow; in a capillary narrower than the cell that is how far they fold.
+  double least_size() const {
+    const double wide = scene_.grid->diameter_um;
+    return wide > 0 && 2 * largest_radius() > wide ? 0.55 : 0.75;
+  }
 
   void count() {
     double share = 0, balls = 0;
@@ -162,6 +168,7 @@ class Packer {
     std::vector<int> placed(types_.size(), 0);
     for (const PackedBody& body : packing.bodies())
       if (body.movable) ++placed[body.group];
+    if (std::all_of(placed.begin(), placed.end(), [](int n) { return n == 0; }) && scene_.cells.empty()) refuse_all();
     std::string text;
     double asked = 0, reached = 0;
     for (std::size_t p = 0; p < types_.size(); ++p) {
@@ -179,7 +186,20 @@ class Packer {
                                              : "they keep the shape that they have at rest: with [contact] they would bend"));
   }
 
-  static constexpr double most_share = 0.75, least_size = 0.75;
+  /// Where not one cell has room, fewer of them are no remedy.
+  [[noreturn]] void refuse_all() const {
+    const PopulationSettings& population = scene_.populations[0];
+    const double wide = 2 * shapes_[types_[0]].radius();
+    const double room = (may_deform() ? least_size() : 1.0) * wide + 2 * population.gap_um;
+    throw InputError(fmt::format("{}: not even one of its cells fits: they are {:.3g} um wide at rest, and {} need about {:.2g} um across: use "
+                                 "a wider grid{}, a smaller gap_um, or smaller cells (cell_types.{}){}",
+                                 amount(population, 0), wide,
+                                 may_deform() ? fmt::format("as membranes, which grow from {:g} of their size,", least_size()) : "in that shape",
+                                 room, scene_.grid->diameter_um > 0 ? fmt::format(" (grid.diameter_um, now {:g})", scene_.grid->diameter_um) : "",
+                                 population.type, may_deform() ? "" : ", or add [contact], with which they bend"));
+  }
+
+  static constexpr double most_share = 0.75;
 
   const Case& scene_;
   const CellPlaces& places_;
@@ -199,6 +219,9 @@ int population_count(const PopulationSettings& population, int number, double fl
   const double cells = population.hematocrit * fluid_volume / cell_volume;
   if (cells > 1e8) throw InputError(fmt::format("{}: {:.2g} cells: is the grid in um?", amount(population, number), cells));
   const int count = static_cast<int>(std::floor(cells + 0.5 + 1e-9));
+  if (cell_volume > fluid_volume)
+    throw InputError(fmt::format("{}: one cell has {:.3g} um3 and the whole grid {:.3g} um3: use a larger grid, or smaller cells",
+                                 amount(population, number), cell_volume, fluid_volume));
   if (count < 1)
     throw InputError(fmt::format("{}: less than half a cell: one has {:.3g} um3, {:.3g} of the fluid's volume; ask for more, or set count",
                                  amount(population, number), cell_volume, cell_volume / fluid_volume));

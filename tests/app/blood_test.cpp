@@ -216,6 +216,36 @@ TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is 
     CHECK_THAT(rest["blood"]["left_out"][missing].get<std::string>(), Catch::Contains("no wall that moves"));
 }
 
+TEST_CASE("blood between four walls has speeds, hematocrits and a viscosity") {
+  const auto folder = fresh_folder("duct");
+  const std::string name = write_case(folder, "driven", false).string();
+  std::string text = contents(name);
+  for (const char* side : {"k_min", "k_max"}) {
+    const std::string open = std::string(side) + "\"\ntype = \"periodic\"";
+    const auto at = text.find(open);
+    REQUIRE(at != std::string::npos);
+    text.replace(at, open.size(), std::string(side) + "\"\ntype = \"wall\"");
+  }
+  text.replace(text.find("[-6, 0, -2]"), 11, "[-6, 0, 0]");
+  std::ofstream(name) << text;
+  const Words run = with({"run", name, "--out", "run"}, {"output.fields=false"});
+  succeed(folder, run, {1, 1});
+  const auto blood = report(folder / "run")["blood"];
+  INFO(blood.dump(1));
+  // In a duct of 4 x 6 um plasma flows at G b^2 / (3 mu) (1 - 192 b / (pi^5 a) sum tanh(n pi a / 2 b) / n^5), n odd (White, Viscous
+  // Fluid Flow, 3-48); half widths a = 3, b = 2.
+  const double pi = std::acos(-1.0);
+  double sum = 0;
+  for (int n = 1; n < 20; n += 2) sum += std::tanh(n * pi * 3 / (2 * 2)) / std::pow(n, 5);
+  const double exact = 6e-3 * 2 * 2 / (3 * 1.1) * (1 - 192 * 2.0 / (std::pow(pi, 5) * 3) * sum) / 1e-3;
+  CHECK(blood["plasma_mean_speed_mm_per_s"].get<double>() == Approx(exact).epsilon(0.03));  // eight cells across
+  CHECK(blood["mean_speed_mm_per_s"].get<double>() > 0);
+  CHECK(blood["relative_apparent_viscosity"].get<double>() > 1);
+  CHECK(blood["discharge_hematocrit"].get<double>() > 0);
+  CHECK_THAT(blood["left_out"]["cell_free_layer_um"].get<std::string>(), Catch::Contains("four walls"));
+  CHECK(blood.dump().find("no flow is driven") == std::string::npos);
+}
+
 TEST_CASE("packed cells with membrane viscosity run") {
   const auto folder = fresh_folder("viscous_population");
   const std::string name = write_case(folder, "driven", false, 1).string();

@@ -68,6 +68,20 @@ TEST_CASE("a coarser run that fails costs the error bars, not the run") {
   CHECK(report(folder / "both")["error_bars_lack"] == nlohmann::json{"spacing"});
 }
 
+TEST_CASE("bars of packed cells are of the step alone, say so, and hold for blood") {
+  const auto folder = fresh_folder("bars_of_packed");
+  const auto outcome =
+      succeed(folder, with({"run", scene("single_file"), "--out", "out", "--estimate-error"},
+                           {"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "time.end_us=20", "time.first_step_us=0", "blood.from_us=0",
+                            "blood.sample_every_us=5", "output.fields=false", "output.cells=false"}));
+  CHECK_THAT(outcome.output, Contains("no error bars from vertices") && Contains("would be packed anew") &&
+                                 Contains("at the end (+- without the error from: spacing, vertices):"));
+  const auto r = report(folder / "out");
+  CHECK(r["error_bars_lack"] == nlohmann::json{"spacing", "vertices"});
+  CHECK(r["error_bars"]["blood_mean_speed_mm_per_s"].get<double>() > 0);
+  CHECK(r["quantities"]["blood_mean_speed_mm_per_s"] == r["blood"]["mean_speed_mm_per_s"]);
+}
+
 TEST_CASE("where a longer step is not possible half of it gives the error bars") {
   const auto folder = fresh_folder("bars_of_half_steps");
   const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=60", "time.end_us=120", "output.every_us=0", "output.history_every_us=60"};

@@ -74,6 +74,17 @@ TEST_CASE("bad figures become warnings with their key, good ones do not") {
   CHECK(figures_of(judge({{"slip", std::nan("")}}, moving)) == Words{"slip"});
 }
 
+TEST_CASE("what membranes as forces leave of the energy is judged by their own good runs") {
+  FigureScales forces = moving;
+  forces.forces = true;
+  const nlohmann::json errors = {{"energy_balance", 0.22}};
+  CHECK(judge(errors, moving).empty());
+  CHECK(figures_of(judge(errors, forces)) == Words{"energy_balance"});
+  CHECK(figures_of(judge({{"energy_balance", 0.4}, {"energy_balance_coupling", 0.4}}, forces)) ==
+        Words{"energy_balance", "energy_balance_coupling"});
+  CHECK(judge({{"energy_balance", 0.02}}, forces).empty());
+}
+
 TEST_CASE("a share of nothing is no warning") {
   const nlohmann::json still = {{"slip", 0.5}, {"energy_balance", 0.9}, {"flux_correction", 1.0}, {"splitting", 0.3},
                                 {"convection_over_viscosity", 0.2}};

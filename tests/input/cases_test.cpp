@@ -183,6 +183,45 @@ TEST_CASE("keys without effect on membranes that are forces are remarked upon") 
   REQUIRE(typed.remarks[0].rfind("cell_types.1.mass_pg = 30 (and 1 more) has no effect", 0) == 0);
 }
 
+TEST_CASE("membranes with viscosity that are forces begin with short steps, unless the case says otherwise") {
+  const std::string viscous = "cell_types.0.membrane_viscosity_N_s_per_m=5e-7";
+  const auto first = [&](const std::vector<std::string>& overrides) { return read("two_cells.toml", overrides).time.first_step_us; };
+  CHECK(first({}) == 0);
+  CHECK(first({viscous}) == 20.0 / 16);
+  CHECK(first({viscous, "time.first_step_us=5"}) == 5);
+  const auto whole = read("two_cells.toml", {viscous, "time.first_step_us=0"});
+  CHECK(whole.time.first_step_us == 0);
+  REQUIRE(whole.remarks.size() == 1);
+  CHECK(whole.remarks[0].find("leave the key out") != std::string::npos);
+  const auto scene = read("two_cells.toml", {viscous});
+  CHECK(scene.remarks.empty());
+  require_same(scene, read_echo(scene));
+  CHECK(read("straight_tube.toml", {"time.first_step_us=0", "cells.0.membrane_viscosity_N_s_per_m=5e-7"}).remarks.empty());
+}
+
+TEST_CASE("keys that mean nothing in a scene are remarked upon") {
+  const auto only = [](const std::string& key, const std::string& override) {
+    const auto scene = read("two_cells.toml", {override});
+    INFO(override);
+    REQUIRE(scene.remarks.size() == 1);
+    CHECK(scene.remarks[0].find(key) != std::string::npos);
+  };
+  REQUIRE(read("two_cells.toml").remarks.empty());
+  only("time.first_step_us = 40 is longer", "time.first_step_us=40");
+  only("no side is an \"outflow\"", "time.stop_before_outflow_um=2");
+  only("less than the shortest step, 20 us", "output.history_every_us=1e-6");
+  only("volume_modulus_Pa = 1000", "cell_types.0.volume_modulus_Pa=1000");
+  // Nothing is left of it that could limit a step.
+  CHECK(read("two_cells.toml", {"cell_types.0.volume_modulus_Pa=1000"}).cells[0].volume_modulus_Pa == 0);
+  CHECK(read("straight_tube.toml").cells[0].volume_modulus_Pa == 248);
+  const auto path = fs::temp_directory_path() / "corpuscle_test_unused.toml";
+  std::ifstream in(cases / "two_cells.toml");
+  std::ofstream(path) << in.rdbuf() << "\n[[cell_types]]\nname = \"idle\"\n";
+  const auto idle = read_case(path.string());
+  REQUIRE(idle.remarks.size() == 1);
+  CHECK(idle.remarks[0].find("cell_types.1 (\"idle\")") != std::string::npos);
+}
+
 TEST_CASE("a restart lists changed laws and constants of types, and refuses other shapes") {
   const auto before = typed_case();
   using Keys = std::vector<std::string>;

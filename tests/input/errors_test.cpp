@@ -401,7 +401,7 @@ TEST_CASE("populations are checked") {
   REQUIRE(with(rbc + "count = 3\nlower_um = [0, 0, 0]\nupper_um = [2, 4, 4]\n") == "accepted");
   require_parts(with("count = 3\n"), {":13: populations.0.type: required key is missing"});
   require_parts(with("type = \"rcb\"\ncount = 3\n"), {":14: populations.0.type = \"rcb\"", "did you mean \"rbc\"?"});
-  require_parts(with(rbc), {":13: populations.0.hematocrit: required key is missing"});
+  require_parts(with(rbc), {":13: populations.0.hematocrit: required key is missing", "or count"});
   require_parts(with(rbc + "count = 3\nhematocrit = 0.3\n"), {":15: populations.0.count", "leave out one of the two"});
   require_parts(with(rbc + "hematocrit = 1.5\n"), {":15: populations.0.hematocrit = 1.5", "at most 0.8"});
   require_parts(with(rbc + "count = 0\n"), {":15: populations.0.count = 0", "from 1 to"});
@@ -409,6 +409,10 @@ TEST_CASE("populations are checked") {
   require_parts(with(rbc + "count = 3\naxis = [1, 0, 0]\n"), {":16: populations.0.axis", "only orientation = \"aligned\""});
   require_parts(with(rbc + "count = 3\nlower_um = [2, 0, 0]\nupper_um = [2, 4, 4]\n"), {":17: populations.0.upper_um", "above lower_um"});
   require_parts(with(rbc + "count = 3\nhematcrit = 0.3\n"), {"populations.0.hematcrit", "did you mean 'hematocrit'?"});
+  const auto surface = (fs::temp_directory_path() / "corpuscle_packed.off").string();
+  std::ofstream(surface) << "read later\n";
+  require_parts(with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", "name = \"rbc\"\nmesh = \"" + surface + "\"\nrecenter = false\n")),
+                {"cell_types.0.recenter", "by the centroid", "leave it out"});
   const std::string viscous = "name = \"rbc\"\nviscosity_ratio = 5\nmembrane_viscosity_N_s_per_m = 5e-7\n";
   REQUIRE(with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", viscous)) == "accepted");
   require_parts(with(rbc + "count = 3\n", "[[cell_types]]\nname = \"rbc\"\n[[populations]]\n"),

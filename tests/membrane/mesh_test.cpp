@@ -72,6 +72,10 @@ TEST_CASE("bad surfaces are refused with what, where and the remedy") {
     for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
     refused(mesh, "inside-out", "-0.166667");
   }
+  SECTION("flat") {
+    mesh.vertices[3] = {0.3, 0.3, 0.0};
+    refused(mesh, "flat", "room inside");
+  }
   SECTION("degenerate triangle") {
     mesh.vertices[3] = {0.5, 0.0, 0.0};
     refused(mesh, "degenerate", "triangle 1");

@@ -120,7 +120,9 @@ def check_plot():
         for setting in ("grid.nodes=[17,17,17]", "time.end_us=400", "cells.0.vertices=200", "blood.from_us=200", "blood.sample_every_us=100", "output.fields=false"):
             words += ["--set", setting]
         check(start([os.environ["CORPUSCLE"], *words]).returncode == 0, "the run with [blood] failed")
-        check(start([*plot, str(blood)]).returncode == 0 and (blood / "blood.png").exists(), "samples of blood cannot be drawn")
+        drawn = start([*plot, str(blood)])
+        check(drawn.returncode == 0 and (blood / "blood.png").exists(), "samples of blood cannot be drawn")
+        check(drawn.stderr == "", f"drawing blood complains of itself:\n{drawn.stderr}")
         refuse(["cannot be made a folder"], "--out", str(run / "report.json" / "below"))
         refuse(["/proc/velocity.png", "cannot be written"], "--out", "/proc")
         history = run / "history.csv"

@@ -1,0 +1,70 @@
+// What there is to warn of at the start of membranes that are forces.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "contact/wall_contact.hpp"
+#include "core/log.hpp"
+#include "coupling/force_coupling.hpp"
+
+namespace corpuscle {
+
+namespace {
+
+/// nN/um
+double shear_modulus(const MembraneLaw& law) {
+  return std::visit(
+      [](const auto& l) {
+        if constexpr (requires { l.spring; })
+          return l.spring.stiffness * shear_modulus_over_stiffness();
+        else
+          return l.material.shear_modulus;
+      },
+      law);
+}
+
+}  // namespace
+
+/// Without contact nothing but the fluid keeps cells from a wall, and between nodes there is none.
+void ForceCoupling::warn_of_walls() const {
+  constexpr double near = 0.5;  // spacings
+  if (loads_ && loads_->report()) return;
+  WallSides sides;
+  for (const auto& boundary : scene_.boundaries) {
+    const int side = static_cast<int>(boundary.side);
+    sides.wall[side / 2][side % 2] =
+        boundary.type == BoundarySettings::Type::wall || boundary.type == BoundarySettings::Type::moving_wall;
+  }
+  if (!sides.any()) return;
+  const Comm& comm = fluid_.grid().comm();
+  const double spacing = fluid_.grid().mean_spacing();
+  const double least =
+      comm.min(least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, near * spacing}));
+  if (least < near * spacing)
+    warn("a cell starts {:.2g} um from a wall, {:.2g} spacings of the grid, and there is no [contact]: nothing resolves the film between "
+         "them, and that the cell goes through the wall would be seen late; add [contact], move the cell (center_um), or refine the grid "
+         "(grid.nodes)",
+         least, least / spacing);
+}
+
+/// Cells that start deep within each other's repulsion are thrown apart by it, not by the flow.
+void ForceCoupling::warn_of_pressed_start() const {
+  constexpr double much = 0.05;
+  if (!loads_ || !loads_->report()) return;
+  const Comm& comm = fluid_.grid().comm();
+  double elastic = 0;
+  for (const CellRecord& cell : cells_->own()) {
+    const CellReference& type = membranes_->types()[cell.type];
+    elastic += shear_modulus(type.in_plane) * type.law.rest_area;
+  }
+  elastic = comm.sum(elastic);
+  const double contact = loads_->contact_energy(lengths_us_.front());
+  if (!(contact > much * elastic)) return;
+  const ContactReport report = *loads_->report();
+  warn("contact: cells start pressed against each other or against walls, with gaps down to {:.2g} um: contact gives off up to {:.3g} fJ, "
+       "{:.2g} of the membranes' shear modulus times their area, which moves cells and fluid until it is spent: lower contact.range_um "
+       "or contact.pressure_Pa, start them farther apart (populations.0.gap_um, center_um), or begin to measure later (blood.from_us)",
+       report.smallest(), contact, contact / elastic);
+}
+
+}  // namespace corpuscle

@@ -1,0 +1,69 @@
+// Scenes of membranes as forces that start where they should not: refused or warned of, with what helps.
+#include <cmath>
+
+#include "program.hpp"
+
+using namespace app;
+using Catch::Contains;
+
+namespace {
+
+Words both(Words all, const Words& more) {
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+std::string checked(const fs::path& folder, const std::string& name, const Words& overrides) {
+  return succeed(folder, with({"check", scene(name)}, overrides)).output;
+}
+
+}  // namespace
+
+TEST_CASE("a load that acts at once on viscous membranes is followed by the first steps") {
+  const auto folder = fresh_folder("viscous_start");
+  const auto way = [&](const Words& overrides) {
+    const Words all{"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "cell_types.0.membrane_viscosity_N_s_per_m=5e-7",
+                    "time.end_us=60", "output.fields=false", "output.cells=false", "output.history_every_us=60"};
+    succeed(folder, with({"run", scene("two_cells"), "--out", "out"}, both(all, overrides)));
+    return report(folder / "out")["quantities"]["cell_0_centroid_z_um"].get<double>() + 1.6;
+  };
+  const double fine = way({"time.step_us=0.625", "time.first_step_us=0"});
+  // The lag is of first order in the first steps: measured 6 and 100 %.
+  CHECK(std::abs(way({}) / fine - 1) < 0.12);
+  CHECK(std::abs(way({"time.first_step_us=0"}) / fine - 1) > 0.3);
+}
+
+TEST_CASE("cells beside a wall without contact, and deep in each other's repulsion, are warned of") {
+  const auto folder = fresh_folder("bad_starts");
+  const Words tube{"grid.nodes=[17,17,27]", "cells.0.vertices=300"};
+  const std::string beside = "um from a wall";
+  CHECK_THAT(checked(folder, "tube_real", both(tube, {"cells.0.center_um=[1.05,0,0]"})), Contains(beside) && Contains("add [contact]"));
+  CHECK_THAT(checked(folder, "tube_real", tube), !Contains(beside));
+  const Words pack{"grid.nodes=[21,21,25]", "cell_types.0.vertices=300", "populations.0.hematocrit=0.2"};
+  const std::string pressed = "start pressed against";
+  CHECK_THAT(checked(folder, "blood_tube", both(pack, {"contact.range_um=2"})), Contains(pressed) && Contains("contact.range_um"));
+  CHECK_THAT(checked(folder, "blood_tube", pack), !Contains(pressed));
+}
+
+TEST_CASE("scenes of membranes as forces that cannot be are refused with what helps") {
+  const auto folder = fresh_folder("refused_starts");
+  const auto refused = [&](const std::string& name, const Words& overrides, const Words& parts) {
+    fail(folder, with({"check", scene(name)}, overrides), 2, parts);
+  };
+  refused("tube_real", {"grid.nodes=[17,17,27]", "cells.0.vertices=300", "cells.0.center_um=[3,0,0]"}, {"is outside the grid at the start", "center_um"});
+  refused("two_cells", {"grid.nodes=[5,5,5]", "time.step_us=10"}, {"the grid is too coarse", "grid.nodes"});
+  refused("blood_tube", {"grid.diameter_um=1"}, {"one cell has", "the whole grid", "larger grid"});
+  refused("single_file", {"grid.nodes=[15,15,65]", "grid.diameter_um=4"}, {"not even one of its cells fits", "um across", "grid.diameter_um, now 4"});
+}
+
+TEST_CASE("warnings name the keys of types where cells have types") {
+  const auto folder = fresh_folder("named_types");
+  succeed(folder, with({"run", scene("two_cells"), "--out", "out"},
+                       {"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=4", "cells.0.start_stretch=[1.5,1,1]",
+                        "output.fields=false"}));
+  const auto warnings = report(folder / "out")["warnings"];
+  const auto found = std::find_if(warnings.begin(), warnings.end(), [](const auto& w) { return w["figure"] == "area_drift"; });
+  REQUIRE(found != warnings.end());
+  CHECK((*found)["key"] == "cell_types.0.area_modulus_uN_per_m");
+  CHECK_THAT((*found)["message"].template get<std::string>(), Contains("cell_types.0.area_modulus") && !Contains("cells.0."));
+}
