@@ -36,15 +36,15 @@ inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const
       });
 }
 
-/// x [vertex, 3] and area [vertex] of the templates, for every body of `set`, each in a place of its own.
-inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, const Components<double>& x,
+/// For every body of `set`: shift [body] from its vertices' numbers to those of its template, and the area [vertex] that they have there.
+inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, const Array<int>& shift,
                       const Array<double>& area) {
   const SurfaceSet from = types, to = set;
   Kokkos::parallel_for(
       "corpuscle::cells::fill_rest", Policy(0, set.vertices), KOKKOS_LAMBDA(int i) {
-        const int body = to.vertex_body(i), v = from.first_vertex(type(body)) + i - to.first_vertex(body);
-        for (int d = 0; d < 3; ++d) x(i, d) = from.x(v, d);
-        area(i) = from.area(v);
+        const int body = to.vertex_body(i), by = from.first_vertex(type(body)) - to.first_vertex(body);
+        if (i == to.first_vertex(body)) shift(body) = by;
+        area(i) = from.area(i + by);
       });
 }
 

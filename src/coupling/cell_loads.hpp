@@ -14,7 +14,8 @@ namespace corpuscle {
 class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
-  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity);
+  /// @param workspace  shared with others that do not use it in the calls below
+  CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, double viscosity, std::shared_ptr<Workspace> workspace);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
 
@@ -57,10 +58,10 @@ class CellLoads {
   const Membranes& membranes_;
   const Comm comm_;
   const Transfer& transfer_;
+  std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<Contact> contact_;  // only with [contact]
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
-  Components<double> wall_;   // [vertex, 3] nN; only with walls
   double smallest_wall_gap_ = 1e30;  // um
   std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
   Table<double> share_;         // [own cell, 3] nN; only if any is pushed
