@@ -36,15 +36,16 @@ inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const
       });
 }
 
-/// x [vertex, 3] and area [vertex] of the templates, for the vertices first <= i < last of `set`, each in a place of its own.
-inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last,
-                      const Components<double>& x, const Array<double>& area) {
+/// For the bodies of the vertices first <= i < last of `set`: shift [body] from their numbers to those of their templates, which begin at
+/// `offset`, and the area [vertex] that they have there.
+inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last, int offset,
+                      const Array<int>& shift, const Array<double>& area) {
   const SurfaceSet from = types, to = set;
   Kokkos::parallel_for(
       "corpuscle::cells::fill_rest", Policy(first, last), KOKKOS_LAMBDA(int i) {
-        const int body = to.vertex_body(i), v = from.first_vertex(type(body)) + i - to.first_vertex(body);
-        for (int d = 0; d < 3; ++d) x(i, d) = from.x(v, d);
-        area(i) = from.area(v);
+        const int body = to.vertex_body(i), by = from.first_vertex(type(body)) - to.first_vertex(body);
+        if (i == to.first_vertex(body)) shift(body) = by + offset;
+        area(i) = from.area(i + by);
       });
 }
 

@@ -52,9 +52,8 @@ struct ContactSearch {
     if (dot(from_centre, from_centre) > most * most || distance_to(p, k) > far) return false;
     if (!own) return true;
     if (within_two_rings(s, v, t)) return false;
-    const Corners at_rest{load(rest.x, s.triangle(t, 0)), load(rest.x, s.triangle(t, 1)),
-                          load(rest.x, s.triangle(t, 2))};
-    return distance_to(load(rest.x, v), at_rest) >= reach.apart;
+    const Corners at_rest{rest.at(s, s.triangle(t, 0)), rest.at(s, s.triangle(t, 1)), rest.at(s, s.triangle(t, 2))};
+    return distance_to(rest.at(s, v), at_rest) >= reach.apart;
   }
 
   /// use(item) for all of vertex v's items, in no particular order.

@@ -5,10 +5,13 @@
 
 namespace corpuscle {
 
-/// What contact knows of surfaces at rest, over all vertices.
+/// What contact knows of surfaces at rest.
 struct ContactRest {
-  Components<double> x;  // [vertex, 3] um, for each body in a place of its own
+  Components<double> x;  // [place, 3] um; bodies alike may have theirs in the same places
+  Array<int> shift;      // [body] from its vertices' numbers to their places in x
   Array<double> area;    // [vertex] um2: how much of its surface a vertex stands for
+
+  KOKKOS_INLINE_FUNCTION Vec3 at(const SurfaceSet& s, int v) const { return load(x, v + shift(s.vertex_body(v))); }
 };
 
 /// The triangles that are near each vertex, or may come near it before the lists are made anew. Items are triangles
@@ -27,6 +30,10 @@ struct ContactViews {
   Array<double> gap;     // [group] um; negative where the vertex is on the wrong side
   Table<double> weight;  // [group, 3] of the triangle's corners at the nearest point
   Table<double> normal;  // [group, 3] unit, from there to where the vertex belongs
+};
+
+/// What contacts do, while it is being done.
+struct ContactPushes {
   Array<double> push;    // [group] along the normal on the vertex, against it on the corners: a force or a way
   Array<int> hit_start;  // [triangle + 1] contacts of each triangle, after sort_hits()
   Array<int> hit;        // [group]

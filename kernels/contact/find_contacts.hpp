@@ -143,10 +143,11 @@ inline double least_gap_to(bool rigid, const SurfaceSet& surface, const ContactL
   return least;
 }
 
-inline double least_of(const Array<double>& gap) {
+/// Of the first `vertices`.
+inline double least_of(int vertices, const Array<double>& gap) {
   double least = 1e30;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::least_gap", Policy(0, static_cast<int>(gap.extent(0))),
+      "corpuscle::contact::least_gap", Policy(0, vertices),
       KOKKOS_LAMBDA(int v, double& sum) { sum = smaller(sum, gap(v)); }, Smallest(least));
   return least;
 }

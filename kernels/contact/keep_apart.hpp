@@ -35,18 +35,20 @@ struct Shortfall : Joined<Shortfall> {
 /// the goal.
 /// @param counted  this rank's own vertices, whose contacts count
 inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists,
-                                 const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted) {
+                                 const ContactViews& contacts, const GapGoal& gap_goal, double range, int counted,
+                                 const Array<double>& push) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const GapGoal goal = gap_goal;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
+  const auto way = push;
   Shortfall all;
   Kokkos::parallel_reduce(
       "corpuscle::contact::gap_corrections", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, Shortfall& sum) {
         for (int g = first(v); g < first(v + 1); ++g) {
-          c.push(g) = 0;
+          way(g) = 0;
           if (c.item(g) < 0 || c.gap(g) >= range || (goal.share == 0 && c.gap(g) >= 0)) continue;
           const int t = item_triangle(s, c.item(g));
           const Corners k = corners(s, t, {});
@@ -57,7 +59,7 @@ inline Shortfall gap_corrections(const SurfaceSet& surface, const Images& image_
           double mobility = v < goal.cells_vertices ? 1 : 0;
           for (int d = 0; d < 3; ++d)
             if (s.triangle(t, d) < goal.cells_vertices) mobility += c.weight(g, d) * c.weight(g, d);
-          c.push(g) = goal.relax * (wanted - now) / mobility;
+          way(g) = goal.relax * (wanted - now) / mobility;
           Shortfall own;
           own.most = (wanted - now) / wanted;
           const bool counting = counts(s, v, c.item(g), counted);

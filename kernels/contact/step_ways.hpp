@@ -30,9 +30,11 @@ struct MeanMotion {
   Vec3 way, velocity;
 };
 
-/// @param listed  [vertex, 3] um, from where ways are measured
-inline MeanMotion mean_motion(const SurfaceSet& surface, const Components<double>& listed) {
+/// @param positions  [vertex, 3] um, from where ways are measured
+template <class Positions>
+MeanMotion mean_motion(const SurfaceSet& surface, const Positions& positions) {
   const SurfaceSet s = surface;
+  const Positions listed = positions;
   Sums<6> mean;
   Kokkos::parallel_reduce(
       "corpuscle::contact::mean_way", Policy(0, s.vertices),
@@ -59,16 +61,19 @@ struct StepWays : Joined<StepWays> {
   }
 };
 
-/// @param listed  [vertex, 3] um, where the lists were made
-/// @param skin    um: vertices had gone half of it at most before the last step
-inline StepWays step_ways(const SurfaceSet& surface, const Components<double>& listed, double skin, double dt) {
+/// @param positions  [vertex, 3] um, where the lists were made
+/// @param skin       um: vertices had gone half of it at most before the last step
+template <class Positions>
+StepWays step_ways(const SurfaceSet& surface, const Positions& positions, double skin, double dt) {
   const SurfaceSet s = surface;
-  const MeanMotion mean = mean_motion(surface, listed);
+  const Positions listed = positions;
+  const MeanMotion mean = mean_motion(surface, positions);
   StepWays ways;
   Kokkos::parallel_reduce(
       "corpuscle::contact::step_ways", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, StepWays& sum) {
-        const double behind = norm(load(s.x, v) - load(listed, v) - mean.way), ahead = dt * norm(load(s.v, v) - mean.velocity);
+        const Vec3 from{listed(v, 0), listed(v, 1), listed(v, 2)};
+        const double behind = norm(load(s.x, v) - from - mean.way), ahead = dt * norm(load(s.v, v) - mean.velocity);
         StepWays own;
         own.whole = behind + ahead;
         own.step.way = larger(behind - 0.5 * skin, ahead);

@@ -17,12 +17,16 @@ inline void copy_motion(int vertices, const Components<double>& x, const Compone
       });
 }
 
-/// to = x + dt v, over the first `vertices` rows, all [vertex, 3].
-inline void move_along(int vertices, const Components<double>& x, const Components<double>& v, double dt,
-                       const Components<double>& to) {
+/// from = x + share dt v, then x += dt v, over the first `vertices` rows, all [vertex, 3].
+inline void set_out(int vertices, const Components<double>& x, const Components<double>& v, double dt, double share,
+                    const Components<double>& from) {
   Kokkos::parallel_for(
-      "corpuscle::membrane::move_along", Policy(0, vertices), KOKKOS_LAMBDA(int i) {
-        for (int d = 0; d < 3; ++d) to(i, d) = x(i, d) + dt * v(i, d);
+      "corpuscle::membrane::set_out", Policy(0, vertices), KOKKOS_LAMBDA(int i) {
+        for (int d = 0; d < 3; ++d) {
+          const double at = x(i, d), way = dt * v(i, d);
+          from(i, d) = at + share * way;
+          x(i, d) = at + way;
+        }
       });
 }
 

@@ -29,9 +29,8 @@ inline void measure_drift(const MembraneViews& m, const MotionViews& w) {
       });
 }
 
-/// Project v so that it changes no volume at x, and move: x = x0 + dt (share v0 + (1 - share) v). After measure_drift().
-inline void project_and_drift(const MembraneViews& m, const MotionViews& w, const Components<double>& x0,
-                              const Components<double>& v0, double share, double dt) {
+/// Project v so that it changes no volume at x, and move: x = x0 + dt v. After measure_drift().
+inline void project_and_drift(const MembraneViews& m, const MotionViews& w, const Components<double>& x0, double dt) {
   const auto x = m.surface.x, v = m.surface.v;
   for_sections(
       "corpuscle::membrane::project_and_drift", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
@@ -40,7 +39,7 @@ inline void project_and_drift(const MembraneViews& m, const MotionViews& w, cons
                              [&](int i) {
                                const Vec3 velocity = load(v, i) + factor * load(w.direction, i);
                                store(v, i, velocity);
-                               store(x, i, load(x0, i) + dt * (share * load(v0, i) + (1 - share) * velocity));
+                               store(x, i, load(x0, i) + dt * velocity);
                              });
       });
 }

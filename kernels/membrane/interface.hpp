@@ -11,6 +11,17 @@ inline void copy_vertices(int count, const Components<double>& from, const Compo
       "corpuscle::coupling::copy", Policy(0, count), KOKKOS_LAMBDA(int i) { store(to, i, load(from, i)); });
 }
 
+/// The first `count` values, or rows of three, which may be rounded.
+inline void copy_values(int count, const Array<double>& from, const Array<double>& to) {
+  Kokkos::parallel_for("corpuscle::coupling::copy_values", Policy(0, count), KOKKOS_LAMBDA(int i) { to(i) = from(i); });
+}
+inline void copy_rounded(int count, const Components<double>& from, const Table<float>& to) {
+  Kokkos::parallel_for(
+      "corpuscle::coupling::copy_rounded", Policy(0, count), KOKKOS_LAMBDA(int i) {
+        for (int d = 0; d < 3; ++d) to(i, d) = static_cast<float>(from(i, d));
+      });
+}
+
 /// w = (x - x_old) / dt: the mean velocity of a step.
 inline void mean_velocity(int count, const Components<double>& x, const Components<double>& x_old, double dt,
                           const Components<double>& w) {

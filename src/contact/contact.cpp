@@ -26,10 +26,39 @@ constexpr double healed_share = 0.1;   // of the range, to which crossings are o
 constexpr double deepest_share = 0.8;  // of the range, from which crossings are put back
 constexpr int most_passes = 8, most_repairs = 20;
 
-template <class View, class... Extents>
-View make(const char* name, Extents... extents) {
-  return View(uninitialised(std::string("corpuscle::contact::") + name), extents...);
+/// Room for so many rows, with some to spare; what was there is lost where there was not enough.
+template <class View, class... Columns>
+void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
+  if (view.data() && view.extent(0) >= rows) return;
+  view = View();  // free before taking more
+  view = View(uninitialised(std::string("corpuscle::contact::") + name), rows + rows / 16 + 1, columns...);
 }
+
+void copy_behind(int count, const Components<double>& vertices, int offset, const Components<double>& behind) {
+  const Components<double> from = vertices, to = behind;
+  Kokkos::parallel_for(
+      "corpuscle::contact::copy_behind", Policy(0, count), KOKKOS_LAMBDA(int i) { store(to, offset + i, load(from, i)); });
+}
+
+/// Parts of a workspace, one after the other.
+class Parts {
+ public:
+  explicit Parts(double* memory) : next_(memory) {}
+  template <class Value>
+  Value* take(std::size_t count) {
+    auto* const part = reinterpret_cast<Value*>(next_);
+    next_ += numbers<Value>(count);
+    return part;
+  }
+  /// Of the workspace's numbers.
+  template <class Value>
+  static std::size_t numbers(std::size_t count) {
+    return (count * sizeof(Value) + sizeof(double) - 1) / sizeof(double);
+  }
+
+ private:
+  double* next_;
+};
 
 /// Where the gap times its whole stiffness reaches the limit, kPa, on the way down from the range.
 double knee_of(const ContactLaw& law, double limit) {
@@ -64,7 +93,11 @@ int last_value(const Array<int>& view, int at) {
 
 Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
                  double blend_um, const ContactPeers* peers)
-    : settings_(settings), surface_(surfaces), images_(images), viscosity_(viscosity) {
+    : settings_(settings),
+      surface_(surfaces),
+      images_(images),
+      viscosity_(viscosity),
+      workspace_(peers ? peers->workspace : std::make_shared<Workspace>()) {
   if (peers) peers_ = *peers;
   constexpr double apart = 1.5;  // of the range: a sheet that is compressed by a third does not repel itself
   reach_.own = settings.range_um;
@@ -74,34 +107,58 @@ Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, co
   make_arrays();
   if (peers) return;  // take_up() follows
   longest_way_ = followed_way * smallest_radius(surfaces, surfaces.cells);
-  Kokkos::deep_copy(rest_.x, surfaces.x);
-  Kokkos::deep_copy(rest_.area, surfaces.area);
+  rest_.x = Components<double>(uninitialised("corpuscle::contact::rest_x"), surfaces.vertices, 3);
+  rest_.shift = Array<int>("corpuscle::contact::rest_shift", surfaces.bodies);
+  copy_vertices(surfaces.vertices, surfaces.x, rest_.x);
+  copy_values(surfaces.vertices, surfaces.area, rest_.area);
 }
 
 void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type, const SurfaceSet* rigid) {
   surface_ = set;
   make_arrays();
-  fill_rest(types, type, surface_, 0, movable_, rest_.x, rest_.area);
-  if (rigid) fill_rest(*rigid, type, surface_, movable_, surface_.vertices, rest_.x, rest_.area);
+  grow(rest_.shift, "rest_shift", set.bodies);
+  fill_rest(types, type, surface_, 0, movable_, 0, rest_.shift, rest_.area);
+  if (rigid) {
+    grow(rest_.x, "rest_x", types.vertices + rigid->vertices, 3);
+    copy_vertices(types.vertices, types.x, rest_.x);
+    copy_behind(rigid->vertices, rigid->x, types.vertices, rest_.x);
+    fill_rest(*rigid, type, surface_, movable_, surface_.vertices, types.vertices, rest_.shift, rest_.area);
+  } else {
+    rest_.x = types.x;
+  }
   if (longest_way_ == 0) longest_way_ = followed_way * smallest_radius(types, types.bodies);
 }
 
 /// For the present surfaces, of whose contacts nothing is known.
 void Contact::make_arrays() {
   const int vertices = surface_.vertices;
-  rest_ = {make<Components<double>>("rest_x", vertices, 3), make<Array<double>>("rest_area", vertices)};
   movable_ = last_value(surface_.first_vertex, surface_.cells);
   own_ = peers_ ? surface_.own_vertices : movable_;
-  lists_.first = make<Array<int>>("first_item", vertices + 1);
-  lists_.first_group = make<Array<int>>("first_contact", vertices + 1);
-  listed_ = make<Components<double>>("listed_x", vertices, 3);
-  side_ = make<Array<int>>("own_side", vertices);
+  grow(rest_.area, "rest_area", vertices);
+  grow(lists_.first, "first_item", vertices + 1);
+  grow(lists_.first_group, "first_contact", vertices + 1);
+  grow(listed_, "listed_x", vertices, 3);
+  grow(side_, "own_side", vertices);
+  grow(gap_, "gap", vertices);
   Kokkos::deep_copy(side_, -1);
-  gap_ = make<Array<double>>("gap", vertices);
-  bins_.order = make<Array<int>>("bin_order", surface_.triangles);
-  now_ = ahead_ = {};
-  lists_.items = lists_.groups = item_room_ = group_room_ = 0;
+  lists_.items = lists_.groups = 0;
   skin_ = -1;
+}
+
+/// What is of no use beyond a call: pushes, and contacts at positions ahead.
+void Contact::take_workspace(bool ahead) {
+  const std::size_t groups = lists_.groups, triangles = surface_.triangles;
+  const std::size_t pushes = Parts::numbers<double>(groups) + Parts::numbers<int>(groups) + Parts::numbers<int>(triangles + 1);
+  const std::size_t contacts = ahead ? Parts::numbers<int>(groups) + 7 * groups : 0;
+  Parts parts(workspace_->reserve(pushes + contacts));
+  pushes_.push = Array<double>(parts.take<double>(groups), groups);
+  pushes_.hit = Array<int>(parts.take<int>(groups), groups);
+  pushes_.hit_start = Array<int>(parts.take<int>(triangles + 1), triangles + 1);
+  if (!ahead) return;
+  ahead_.gap = Array<double>(parts.take<double>(groups), groups);
+  ahead_.weight = Table<double>(parts.take<double>(3 * groups), groups, 3);
+  ahead_.normal = Table<double>(parts.take<double>(3 * groups), groups, 3);
+  ahead_.item = Array<int>(parts.take<int>(groups), groups);
 }
 
 void Contact::make_bins(double width) {
@@ -120,58 +177,40 @@ void Contact::make_bins(double width) {
     }
     if (count > most) bins_.width *= 1.3;
   } while (count > most);
-  if (bins_.count() + 1 > bin_room_) {
-    bin_room_ = bins_.count() + 1 + bins_.count() / 4;
-    bins_.start = make<Array<int>>("bin_start", bin_room_);
-  }
+  const std::size_t starts = bins_.count() + 1, triangles = surface_.triangles;
+  Parts parts(workspace_->reserve(Parts::numbers<int>(starts) + Parts::numbers<int>(triangles)));
+  bins_.start = Array<int>(parts.take<int>(starts), starts);
+  bins_.order = Array<int>(parts.take<int>(triangles), triangles);
   sort_triangles(surface_, bins_);
-}
-
-/// @param shares  the arrays of pushes and hits are those of the other contacts, which are never needed at the same
-/// time
-ContactViews Contact::make_contacts(const ContactViews* shares) const {
-  ContactViews c;
-  if (shares) c = *shares;
-  c.item = make<Array<int>>("contact_item", group_room_);
-  c.gap = make<Array<double>>("contact_gap", group_room_);
-  c.weight = make<Table<double>>("contact_weight", group_room_, 3);
-  c.normal = make<Table<double>>("contact_normal", group_room_, 3);
-  if (shares) return c;
-  c.push = make<Array<double>>("contact_push", group_room_);
-  c.hit = make<Array<int>>("contact_hit", group_room_);
-  c.hit_start = now_.hit_start.data() ? now_.hit_start : make<Array<int>>("hit_start", surface_.triangles + 1);
-  return c;
 }
 
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
 /// @param way  um, from the present lists to the end of the next step
 void Contact::make_lists(double way, double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
+  constexpr double kept = 0.48;             // half, less what rounding positions to single precision may hide
   if (surface_.vertices == 0) return;  // on this rank, at present
-  if (skin_ >= 0 && way < 0.5 * skin_) return;
-  copy_vertices(surface_.vertices, surface_.x, listed_);
+  if (skin_ >= 0 && way < kept * skin_) return;
+  copy_rounded(surface_.vertices, surface_.x, listed_);
   if (skin_ >= 0) way = step_ways(surface_, listed_, 0, dt).whole;
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
   make_bins(std::max(with_skin.other, with_skin.own));
   const ContactSearch search{surface_, images_, bins_, rest_, with_skin};
   lists_.items = countable_items(count_items(search, lists_));
-  if (lists_.items > item_room_) {
-    item_room_ = lists_.items + lists_.items / 4;
-    lists_.item = make<Array<int>>("items", item_room_);
-  }
+  grow(lists_.item, "items", lists_.items);
   fill_items(search, lists_);
   lists_.groups = number_groups(lists_, surface_.vertices);
-  if (lists_.groups > group_room_ || !now_.hit_start.data()) {
-    group_room_ = lists_.groups + lists_.groups / 4;
-    now_ = make_contacts(nullptr);
-  }
+  grow(now_.item, "contact_item", lists_.groups);
+  grow(now_.gap, "contact_gap", lists_.groups);
+  grow(now_.weight, "contact_weight", lists_.groups, 3);
+  grow(now_.normal, "contact_normal", lists_.groups, 3);
   ++report_.lists;
 }
 
 StepWays Contact::ways(double dt) const {
   if (surface_.vertices == 0) return {};
-  return step_ways(surface_, skin_ < 0 ? surface_.x : listed_, std::max(0.0, skin_), dt);
+  return skin_ < 0 ? step_ways(surface_, surface_.x, 0, dt) : step_ways(surface_, listed_, skin_, dt);
 }
 
 void Contact::find(const ContactViews& contacts) {
@@ -184,6 +223,7 @@ Shortfall Contact::correct(double share, double least) {
   constexpr double relax = 0.6, enough = 1e-3;
   const GapGoal goal{share, least, relax, movable_};
   Shortfall before;
+  take_workspace(false);
   for (int pass = 0; pass < most_passes; ++pass) {
     const Shortfall now = shortfall(goal);
     if (pass == 0) before = now;
@@ -197,8 +237,8 @@ Shortfall Contact::correct(double share, double least) {
 /// Adds the contacts' pushes to `sum` [vertex, 3] of this rank's own.
 void Contact::push(const ContactViews& contacts, const Components<double>& sum) {
   if (surface_.vertices == 0) return;
-  sort_hits(surface_, lists_.groups, contacts);
-  add_pushes(surface_, lists_, contacts, own_, sum);
+  sort_hits(surface_, lists_.groups, contacts, pushes_);
+  add_pushes(surface_, lists_, contacts, pushes_, own_, sum);
 }
 
 void Contact::limit_ahead() { correct(keep_share, 0); }
@@ -211,7 +251,7 @@ void Contact::limit_approach(double time) {
 
 /// Of all ranks together, but for the contact that is named.
 Shortfall Contact::shortfall(const GapGoal& goal) {
-  Shortfall found = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um, own_);
+  Shortfall found = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um, own_, pushes_.push);
   if (!peers_) return found;
   found.most = peers_->comm.max(found.most);
   found.limited = static_cast<int>(peers_->comm.sum(static_cast<long>(found.limited)));
@@ -265,7 +305,7 @@ void Contact::look(double time, double dt) {
 /// Of all ranks together.
 void Contact::note_gaps() {
   const bool rigid = surface_.bodies > surface_.cells;
-  double least[3] = {rigid ? least_gap_to(false, surface_, lists_, now_) : least_of(gap_), least_own_gap(surface_, lists_, now_),
+  double least[3] = {rigid ? least_gap_to(false, surface_, lists_, now_) : least_of(surface_.vertices, gap_), least_own_gap(surface_, lists_, now_),
                      rigid ? least_gap_to(true, surface_, lists_, now_) : far_away};
   if (peers_)
     for (double& gap : least) gap = peers_->comm.min(gap);
@@ -308,11 +348,10 @@ double Contact::fastest_relaxation_per_us() const {
 }
 
 void Contact::add_forces(double dt, bool ahead, const Components<double>& force) {
-  const bool made = ahead_.hit_start.data() && ahead_.item.extent(0) >= now_.item.extent(0);
-  if (ahead && !made) ahead_ = make_contacts(&now_);
+  take_workspace(ahead);
   const ContactViews& contacts = ahead ? ahead_ : now_;
   if (ahead) find(contacts);
-  contact_forces(surface_, law(dt), rest_, lists_, contacts);
+  contact_forces(surface_, law(dt), rest_, lists_, contacts, pushes_.push);
   push(contacts, force);
 }
 

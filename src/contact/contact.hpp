@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -13,6 +14,7 @@
 #include "contact/contact_views.hpp"
 #include "contact/keep_apart.hpp"
 #include "contact/triangle_bins.hpp"
+#include "core/workspace.hpp"
 #include "input/case.hpp"
 #include "parallel/comm.hpp"
 
@@ -22,6 +24,7 @@ namespace corpuscle {
 struct ContactPeers {
   Comm comm;
   std::function<void()> update_copies;  // positions of this rank's cells to all their copies
+  std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>();  // shared with others that do not use it while Contact does
 };
 
 /// Of the lists' entries on a rank. @throws ComputationError  for more than an int counts
@@ -84,6 +87,7 @@ class Contact {
 
  private:
   void make_arrays();
+  void take_workspace(bool ahead);
   void push(const ContactViews& contacts, const Components<double>& sum);
   CrossingCount crossings();
   void note_gaps();
@@ -92,7 +96,6 @@ class Contact {
   StepWays ways(double dt) const;
   void make_lists(double way, double dt);
   void make_bins(double width);
-  ContactViews make_contacts(const ContactViews* shares) const;
   void find(const ContactViews& contacts);
   Shortfall correct(double share, double least);
   void mend_crossings(double time_us, double dt);
@@ -111,12 +114,12 @@ class Contact {
   double viscosity_;
   ContactReach reach_;  // without the skin
   ContactRest rest_;
-  TriangleBins bins_;
-  int bin_room_ = 0;
+  TriangleBins bins_;  // in the workspace, as lists are made
   ContactLists lists_;
-  int item_room_ = 0, group_room_ = 0;
-  ContactViews now_, ahead_;   // at the positions of look(), and at those ahead if there are any
-  Components<double> listed_;  // [vertex, 3] um, where the lists were made
+  ContactViews now_;      // at the positions of look()
+  ContactViews ahead_;    // at those ahead; in the workspace
+  ContactPushes pushes_;  // there as well
+  Table<float> listed_;   // [vertex, 3] um, where the lists were made
   double skin_ = -1;           // um; negative before there are lists
   double longest_way_ = 0;     // um, in a step, beyond the mean of all
   Array<int> side_;            // [vertex]
@@ -124,6 +127,7 @@ class Contact {
   int movable_ = 0;            // vertices of cells
   int own_ = 0;                // of those of this rank
   std::optional<ContactPeers> peers_;
+  std::shared_ptr<Workspace> workspace_;
   ContactReport report_;
 };
 

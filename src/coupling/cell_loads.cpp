@@ -80,15 +80,16 @@ bool CellLoads::wanted(const Case& scene) {
 }
 
 CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
-                     const SurfaceSet* rigid)
-    : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer) {
+                     std::shared_ptr<Workspace> workspace, const SurfaceSet* rigid)
+    : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer), workspace_(std::move(workspace)) {
   if (scene.contact) {
     const double blend = scene.coupling->slip ? slip_reach * comm_.max(transfer.largest_spacing()) : 0;
     const ContactPeers peers{comm_, [this] {
                                if (joined_) joined_->give_back(cells_.surfaces());
                                cells_.to_copies(cells_.surfaces().x, true);
                                follow_bodies();
-                             }};
+                             },
+                             workspace_};
     contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
     walls_ = walls_of(scene);
     refuse_thin_blocks(scene.contact->range_um);
@@ -125,17 +126,22 @@ void CellLoads::refuse_thin_blocks(double range) const {
 
 void CellLoads::take_up() {
   const SurfaceSet& set = membranes_.surfaces();
-  force_ = Components<double>("corpuscle::coupling::load", set.vertices, 3);
+  if (!force_.data() || force_.extent(0) < static_cast<std::size_t>(set.vertices)) {
+    force_ = Components<double>();  // free before taking more
+    force_ = Components<double>("corpuscle::coupling::load", set.vertices + set.vertices / 64 + 1, 3);
+  }
+  Kokkos::deep_copy(force_, 0.0);
   if (joined_) {
     joined_->take_up(set, membranes_.templates(), membranes_.views().type);
     contact_->take_up(joined_->set(), membranes_.templates(), joined_->type(), &joined_->rigid());
   } else if (contact_) {
     contact_->take_up(set, membranes_.templates(), membranes_.views().type);
   }
-  if (walls_.any()) wall_ = Components<double>("corpuscle::contact::wall_load", set.vertices, 3);
   if (push_.empty()) return;
-  share_ = Table<double>("corpuscle::coupling::push_share", membranes_.cells() + 1, 3);
+  if (const std::size_t rows = membranes_.cells() + 1; !share_.data() || share_.extent(0) < rows)
+    share_ = Table<double>(uninitialised("corpuscle::coupling::push_share"), rows + rows / 16 + 1, 3);
   const auto share = Kokkos::create_mirror_view(share_);
+  Kokkos::deep_copy(share, 0.0);
   for (std::size_t c = 0; c < cells_.own().size(); ++c) {
     const auto push = push_.find(cells_.own()[c].number);
     if (push == push_.end()) continue;
@@ -192,9 +198,11 @@ void CellLoads::gather(double dt, bool ahead) {
 /// Each rank knows the walls of its own block; its copies' parts go to their cells.
 void CellLoads::add_walls(double dt) {
   const ContactLaw law = contact_->law(dt);
-  wall_forces(at_walls(law.range), law, contact_->rest_area(), wall_);
-  cells_.add_copies(wall_);
-  add_forces(membranes_.vertices(), wall_, force_);
+  const std::size_t vertices = membranes_.surfaces().vertices;
+  const Components<double> of_walls(workspace_->reserve(3 * vertices), vertices, 3);
+  wall_forces(at_walls(law.range), law, contact_->rest_area(), of_walls);
+  cells_.add_copies(of_walls);
+  add_forces(membranes_.vertices(), of_walls, force_);
 }
 
 double CellLoads::power_of_pushes() const {

@@ -15,10 +15,11 @@ namespace corpuscle {
 class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
+  /// @param workspace  shared with others that do not use it in the calls below
   /// @param rigid      rigid bodies that cells meet; null for none
   /// @throws InputError  where walls act beyond the blocks beside them
   CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
-            const SurfaceSet* rigid = nullptr);
+            std::shared_ptr<Workspace> workspace, const SurfaceSet* rigid = nullptr);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
 
@@ -70,11 +71,11 @@ class CellLoads {
   const Membranes& membranes_;
   const Comm comm_;
   const Transfer& transfer_;
+  std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<Contact> contact_;        // only with [contact]
   std::unique_ptr<JoinedSurfaces> joined_;  // and rigid bodies
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
-  Components<double> wall_;   // [vertex, 3] nN; only with walls
   double smallest_wall_gap_ = 1e30;  // um
   std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
   Table<double> share_;         // [own cell, 3] nN; only if any is pushed

@@ -95,8 +95,8 @@ class Coupling {
   /// Of the case's populations; null without any. And this rank's share of where they were packed, for checkpoints.
   virtual const PackingReport* packing() const { return nullptr; }
   virtual const PackedShare* packed() const { return nullptr; }
-  /// A checkpoint's cells are in shared_cells().
-  virtual void cells_restored() {}
+  /// A checkpoint's cells are in shared_cells(). @param time_us  of the checkpoint
+  virtual void cells_restored(double /*time_us*/) {}
   /// Of the whole scene.
   virtual int cells() { return membranes() ? membranes()->cells() : 0; }
   virtual long vertices() { return surfaces().vertices; }

@@ -65,7 +65,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
     bodies_->immersed()->boundary().wrap(0, bodies_->surfaces().bodies, true);
   }
   if (CellLoads::wanted(scene))
-    loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.grid(), fluid.viscosity(),
+    loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.grid(), fluid.viscosity(), workspace_,
                                          bodies_ ? &bodies_->surfaces() : nullptr);
   fluid.set_face_force(transfer_->faces());
   std::vector<double> ratios;
@@ -208,8 +208,8 @@ void ForceCoupling::check_start() {
   }
   warn_of_image();
   if (packing_ && !small_) check_packing();
-  measure_stability();
   find_softest();
+  measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
   if (small_) return membranes_->rest_at_size(1);
   warn_of_walls();
@@ -284,8 +284,10 @@ void ForceCoupling::measure_stability() {
   // Of each type the same cell on any number of ranks: what slip is held to goes by this.
   std::vector<int> numbers = membranes_->first_of_types();
   for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));
+  // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
+  const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
   const double fastest =
-      std::max(membranes_->fastest_relaxation_per_us(model, numbers), loads_ ? loads_->fastest_relaxation_per_us() : 0);
+      std::max(membranes_->fastest_relaxation_per_us(model, numbers, beta), loads_ ? loads_->fastest_relaxation_per_us() : 0);
   stable_us_ = limit / fluid_.grid().comm().max(fastest);
 }
 
@@ -334,6 +336,7 @@ double ForceCoupling::anticipated_reaction(double dt) const {
 
 void ForceCoupling::find_softest() {
   if (!membranes_->viscosity()) return;
+  softest_ = {};
   const double pi = std::acos(-1.0);
   const Grid& grid = fluid_.grid();
   double largest = 0;
@@ -404,7 +407,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   }
   {
     const auto scope = timers_.scope("membrane");
-    together([&] { membranes_->drift(dt, second_order(dt) ? 0.5 : 0); });
+    together([&] { membranes_->drift(dt); });
   }
   if (loads_) after_move(time + dt, dt);
   StepStatistics statistics;
@@ -486,8 +489,7 @@ double ForceCoupling::power_on_sides() {
 }
 
 double ForceCoupling::power_on_sides(const Components<double>& of_sides) {
-  const Components<double> room(uninitialised("corpuscle::coupling::beside_sides"), surfaces().vertices, 3);
-  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), of_sides, room));
+  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), of_sides));
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {
@@ -510,11 +512,11 @@ std::vector<Triple> ForceCoupling::wrapped_by() const {
 }
 
 /// Where the cells are is known at once: a run may end with its checkpoint, at an outflow.
-void ForceCoupling::cells_restored() {
+void ForceCoupling::cells_restored(double time) {
   cells_->to_copies(surfaces().x, true);
   take_up();
   if (loads_) loads_->take_up();
-  place(0);
+  place(time);
 }
 
 }  // namespace corpuscle

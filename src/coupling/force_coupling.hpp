@@ -42,7 +42,7 @@ class ForceCoupling : public Coupling {
   /// The largest stable step, where it is not that of cells at rest.
   std::vector<double> state() const override;
   void set_state(const std::vector<double>& state) override;
-  void cells_restored() override;
+  void cells_restored(double time_us) override;
   void resume(double time_us) override;
   std::vector<Triple> wrapped_by() const override;
   const SurfaceSet& surfaces() const override { return cells_->surfaces(); }

@@ -123,6 +123,7 @@ void ForceCoupling::inflate() {
   try {
     membranes_->rest_at_size(size);
     cells_->to_copies(surfaces().x, true);
+    find_softest();
     measure_stability();
     small_stable_us_ = stable_us_;
     still();
@@ -165,7 +166,7 @@ void ForceCoupling::settle_membranes(double size, double& mobility, long step) {
   place(0);
   loads_->gather(pace_us, false);
   scale_forces(membranes_->vertices(), mobility, loads_->force(), surfaces().v);
-  together([&] { membranes_->drift(pace_us, 0); });
+  together([&] { membranes_->drift(pace_us); });
   after_move(0, pace_us);
 }
 

@@ -232,7 +232,7 @@ void read_coupling(const CheckpointReader& file, FlowSimulation& simulation, boo
   }
   if (simulation.shared_cells()) {
     read_cells(file, simulation.grid().comm(), *simulation.shared_cells());
-    simulation.coupling()->cells_restored();
+    simulation.coupling()->cells_restored(file.header().time_us);
   } else if (simulation.membranes()) {
     std::vector<double> membranes(simulation.membranes()->state().size());
     file.read("membranes", {membranes.size()}, membranes.data());

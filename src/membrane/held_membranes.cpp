@@ -108,7 +108,6 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(views_.force, "force_vertex", needed.vertices, 3);
   grow(motion_.sums, "motion_sums_section", std::size_t(views_.cells) * sections, 2);
   grow(start_x_, "start_x_vertex", views_.vertices, 3);
-  grow(start_v_, "start_v_vertex", views_.vertices, 3);
 }
 
 /// What is only of use within a call lies where others have such things in between.

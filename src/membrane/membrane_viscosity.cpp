@@ -88,23 +88,38 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
 }
 
 template <class Damping>
-void MembraneViscosity::resist_with(const MembraneViews& m, double beta, const Components<double>& force) const {
+void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const {
   constexpr double massless = 1e300;  // us: mass over it
-  assemble_viscous<Damping>(m, views_, FluidReaction{beta, m.surface.v, given_, force}, massless);
+  assemble_viscous<Damping>(m, views_, fluid, massless);
   if (band_.teams > 0)
     solve_held<Damping>(m, views_, band_);
   else
     solve_held<Damping>(m, views_);
-  subtract_damping<Damping>(m, views_, m.surface.v, force, views_.right_side);
-  copy_vertices(m.vertices, force, given_);
+  subtract_damping<Damping>(m, views_, m.surface.v, fluid.force, damping);
+}
+
+void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const {
+  if (tangential_)
+    resist_with<FullDamping>(m, fluid, damping);
+  else
+    resist_with<CentralDamping>(m, fluid, damping);
 }
 
 void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force) {
   divide_scratch(m, workspace.reserve(scratch_numbers(m)));
-  if (tangential_)
-    resist_with<FullDamping>(m, beta, force);
-  else
-    resist_with<CentralDamping>(m, beta, force);
+  resist_with(m, {beta, m.surface.v, given_, force}, views_.right_side);
+  copy_vertices(m.vertices, force, given_);
+}
+
+void MembraneViscosity::relieve(const MembraneViews& m, Workspace& workspace, double beta, const StiffnessViews& work) {
+  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
+  MembraneViews at_rest = m;
+  at_rest.force = work.mode;
+  at_rest.surface.v = work.force_ahead;
+  Kokkos::deep_copy(work.force_ahead, 0.0);
+  Kokkos::deep_copy(work.force_behind, 0.0);
+  resist_with(at_rest, {beta, work.force_ahead, work.force_behind, work.mode}, work.probe);
+  Kokkos::deep_copy(views_.right_side, 0.0);  // nothing has been taken off any force yet
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

@@ -4,6 +4,7 @@
 #include "core/workspace.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/reference.hpp"
+#include "membrane/stiffness.hpp"
 #include "membrane/viscous_band.hpp"
 
 namespace corpuscle {
@@ -33,6 +34,10 @@ class MembraneViscosity {
   /// current.
   void resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force);
 
+  /// What a step leaves of the forces mode [vertex, 3] of membranes that were at rest and gave none: takes D v off them, where
+  /// (beta A + D) v = mode + q dV/dx. The other arrays are overwritten. Only with hold(); otherwise as resist().
+  void relieve(const MembraneViews& m, Workspace& workspace, double beta, const StiffnessViews& work);
+
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
              const Components<double>& force) const;
@@ -46,8 +51,10 @@ class MembraneViscosity {
  private:
   std::size_t scratch_numbers(const MembraneViews& m) const;
   void divide_scratch(const MembraneViews& m, double* memory);
+  /// @param m  whose velocities are U and become v  @param damping  [vertex, 3] becomes D v
   template <class Damping>
-  void resist_with(const MembraneViews& m, double beta, const Components<double>& force) const;
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
 
   bool tangential_;
   Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off

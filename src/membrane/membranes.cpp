@@ -199,16 +199,16 @@ int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
 
 void Membranes::set_out(double ahead_us) {
   drifts_ = true;
-  copy_motion(views_.vertices, views_.surface.x, views_.surface.v, start_x_, start_v_);
-  if (ahead_us > 0) move_along(views_.vertices, start_x_, start_v_, ahead_us, views_.surface.x);
+  share_ahead_ = ahead_us > 0 ? 0.5 : 0;
+  corpuscle::set_out(views_.vertices, views_.surface.x, views_.surface.v, ahead_us, share_ahead_, start_x_);
 }
 
-void Membranes::drift(double dt, double share) {
+void Membranes::drift(double dt) {
   if (views_.cells == 0) return;
   take_workspace();
   Kokkos::deep_copy(views_.status, 0);
   measure_drift(views_, motion_);
-  project_and_drift(views_, motion_, start_x_, start_v_, share, dt);
+  project_and_drift(views_, motion_, start_x_, (1 - share_ahead_) * dt);
   measure_membranes(views_, views_.surface.x);
   measure_drift(views_, motion_);
   restore_volume(views_, motion_, volume_rate * dt);
@@ -222,19 +222,25 @@ std::vector<int> Membranes::first_of_types() const {
   return first;
 }
 
-double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers) {
+double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta) {
   std::vector<int> cells;
   for (int c = 0; c < views_.cells; ++c)
     if (std::find(numbers.begin(), numbers.end(), number(c)) != numbers.end()) cells.push_back(c);
-  return cells.empty() ? 0 : fastest_relaxation(model, cells);
+  return cells.empty() ? 0 : fastest_relaxation(model, cells, beta);
 }
 
-/// Power iteration on mobility times stiffness, for some of the cells.
-double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells) {
+/// Power iteration on mobility times stiffness, for some of the cells. Of a mode with mobility m, stiffness k and membrane viscosity l
+/// the force follows f' = (l (1 - b m) f - b k x) / (b + l), b = beta A: Euler's steps are stable up to 2 / (m k) (1 + l (2 / b - m)),
+/// which is at least 2 (b + l) / (b m k) as long as b m < 1. Such a mode relaxes as if at rates b / (b + l) times as fast.
+double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta) {
   constexpr double distance = 1e-4;  // um, as for the stiffness
+  const bool viscous = viscosity_ && workspace_ && beta > 0;
   take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
+  MembraneViews up_to_last = views_;
+  up_to_last.cells = cells.back() + 1;
+  up_to_last.vertices = first(up_to_last.cells);
   start_mode(views_, work);
   for (int i = 0; i < power_iterations; ++i) {
     displace(views_, work, distance);
@@ -242,6 +248,10 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
     displace(views_, work, -distance);
     elasticity_->membrane_forces(views_, work.probe, work.force_behind);
     difference_forces(views_, work, distance);
+    if (viscous) {
+      viscosity_->relieve(up_to_last, *workspace_, beta, work);
+      take_workspace();
+    }
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
   }
   const auto sums = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), work.sums);

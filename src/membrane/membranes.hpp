@@ -137,13 +137,14 @@ class Membranes {
   int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0,
               const Components<double>& v_star = {});
 
-  /// Begin a step of membranes that move with the fluid: put them where their last velocities bring them in `ahead_us`.
+  /// Begin a step of membranes that move with the fluid: put them where their last velocities bring them in `ahead_us`, the whole
+  /// step or nothing.
   void set_out(double ahead_us);
-  /// End it: move all cells by `dt_us`, from where they were, with `share` of their last velocities and the rest of those that
-  /// surfaces().v holds, of the fluid around, once these are projected so that they change no volume. Volumes are V0 then. After
-  /// compute_forces() at the present positions.
+  /// End it: move all cells by `dt_us`, from where they were, with the velocities that surfaces().v holds, of the fluid around, once
+  /// these are projected so that they change no volume; where the step set out ahead, with the mean of them and the last ones.
+  /// Volumes are V0 then. After compute_forces() at the present positions.
   /// @throws ComputationError  if a position is not finite
-  void drift(double dt_us, double share);
+  void drift(double dt_us);
 
   /// [type] the number of its first cell here; no_cell without one.
   std::vector<int> first_of_types() const;
@@ -152,7 +153,8 @@ class Membranes {
   /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over those cells, 1/us; 0 without any.
   /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
   /// @param numbers  of the cells that stand for their types; those that other ranks have are passed over
-  double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers);
+  /// @param beta     of resist(), for membranes whose viscosity slows them down, but for hold() not at all; before the first step
+  double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta = 0);
 
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
   void save_state();
@@ -190,7 +192,7 @@ class Membranes {
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
-  double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells);
+  double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta);
   [[noreturn]] void explain(int cell, double dt);
   [[noreturn]] void explain_area(int cell, double drift) const;
 
@@ -211,6 +213,7 @@ class Membranes {
   std::vector<double> stiffness_;                // [cell] largest eigenvalue, nN/um; empty before the first estimate
   std::vector<double> rest_area_, rest_volume_;  // [cell]
   long calls_ = 0;                               // of advance
+  double share_ahead_ = 0;                       // of the last velocities, in the present step's move
   bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()
   std::unique_ptr<Snapshot> saved_;
   std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any

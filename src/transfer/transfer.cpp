@@ -144,14 +144,15 @@ void Transfer::make_room(int markers) {
 }
 
 /// The markers' weights, which no one needs who has the workspace before.
-void Transfer::weigh() {
-  if (weighed_) return;
+/// @param more  numbers that are wanted beside them  @returns where those are; null if the weights were there
+double* Transfer::weigh(std::size_t more) {
+  if (weighed_) return nullptr;
   weighed_ = true;
   int points = 0;
   with_kernel([&](auto delta) { points = decltype(delta)::points; });
   const auto rows = static_cast<std::size_t>(markers_.count);
   const std::size_t dipoles = ratios_.empty() ? 0 : 3;
-  double* memory = workspace_->reserve((6 * points + 3 + dipoles) * rows);
+  double* memory = workspace_->reserve((6 * points + 3 + dipoles) * rows + more);
   markers_.weight = Table<double>(memory, rows, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
   markers_.dipole = Table<double>(memory + (6 * points + 3) * rows, dipoles > 0 ? rows : 0, dipoles);
@@ -159,6 +160,7 @@ void Transfer::weigh() {
     prepare_markers<decltype(delta)>(block_, markers_);
     mark_near<decltype(delta)>(block_, markers_);
   });
+  return memory + (6 * points + 3 + dipoles) * rows;
 }
 
 int Transfer::place(const Components<double>& x) {
@@ -276,19 +278,20 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
 }
 
 /// What vertices have of the sides' velocities is what they have where all fluxes are zero.
-double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u, const Components<double>& room) {
+double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u) {
   weighed_ = false;
-  weigh();
+  const std::size_t vertices = places_.vertices;
+  const Components<double> of_sides(weigh(3 * vertices), vertices, 3);
   const bool sharp = moment_ > 0;
   for (int d = 0; d < 3; ++d) {
     if (!raw_[d].data()) raw_[d] = Array<double>("corpuscle::transfer::raw_face", block_.index().size());
     Kokkos::deep_copy(raw_[d], 0.0);
     if (sharp) sharpen_faces(block_, Sharpen::fluxes, d, moment_, u, raw_[d], sharp_flux_[d]);
   }
-  Kokkos::deep_copy(room, 0.0);
+  Kokkos::deep_copy(of_sides, 0.0);
   const auto& through = const_fluxes(sharp ? sharp_flux_ : raw_);
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, through, u, markers_, room); });
-  return power_of(places_.vertices, force, room);
+  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, through, u, markers_, of_sides); });
+  return power_of(places_.vertices, force, of_sides);
 }
 
 void Transfer::slip_between(const std::vector<double>& ratios) {

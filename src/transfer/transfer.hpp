@@ -47,8 +47,8 @@ class Transfer {
   void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                    const Components<double>& velocity);
   /// Power that forces [vertex, 3] give to sides that move: the part of a kernel that is folded back pushes the side itself. This
-  /// rank's part, nW. Finds all weights anew: for reports. @param room  [vertex, 3], written over
-  double power_on_sides(const Components<double>& force, const Components<double>& u, const Components<double>& room);
+  /// rank's part, nW. Finds all weights anew: for reports.
+  double power_on_sides(const Components<double>& force, const Components<double>& u);
   /// What the slip of a membrane depends on, with this kernel's law.
   /// @param type  [body] as for slip_between(); without values there is but one fluid
   /// @param gap  [vertex] um to the nearest other surface; without values nothing is near
@@ -79,7 +79,7 @@ class Transfer {
   void spread_rest(const Components<double>& force, const SurfaceSet* surface, const SlipViews* slip);
   void make_places(int vertices);
   void make_room(int markers);
-  void weigh();
+  double* weigh(std::size_t more = 0);
   template <class Use>
   void with_kernel(const Use& use) const;
 

@@ -46,6 +46,8 @@ STUDIES = {
     "membrane_transfer.py": ("membrane_transfer.md", [
         (["--minutes", "0"], ["# Membranes as forces", "x + 2 y", ALL]),
         (["--quick", "--minutes", "0.02"], ["# Membranes as forces", "stopped: out of time", ALL])]),
+    "blood_memory": ("blood_memory.md", [(["--minutes", "0"], ["# What cells take of memory", "| 1600 | and contact |", ALL]),
+                                         (["--cells", "4", "--minutes", "0.03"], ["# What cells take of memory"])]),
     "blood_speed": ("blood_speed.md", [(["--minutes", "0"], ["# What blood costs", "half the step", ALL]),
                                        (["--quick", "--minutes", "0.04"], ["# What blood costs", "half the step", ALL])]),
 }
