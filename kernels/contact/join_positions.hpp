@@ -8,8 +8,11 @@ namespace corpuscle {
 
 /// Rigid bodies of a joined set: which they are, and by how much they are shifted.
 struct RigidImages {
-  Array<int> body;      // [rigid body of the joined set]
-  Table<double> shift;  // [same, 3] um
+  Array<int> body;       // [rigid body of the joined set]
+  Table<double> shift;   // [same, 3] um
+  Table<int> laps;       // [rigid body, 3] periods by which each has been moved back
+  Table<int> laps_then;  // when the set was made: since then a body goes on here without a jump
+  Vec3 period[3];        // um; zero along directions that are not periodic
 };
 
 /// Positions and velocities of `joined`: first those of the cells, then those of the rigid bodies under their images.
@@ -24,9 +27,13 @@ inline void join_positions(const SurfaceSet& cells, const SurfaceSet& rigid, con
           return;
         }
         const int body = to.vertex_body(v), image = body - to.cells;
-        const int source = of_rigid.first_vertex(images.body(image)) + v - to.first_vertex(body);
+        const int rigid_body = images.body(image), source = of_rigid.first_vertex(rigid_body) + v - to.first_vertex(body);
         Vec3 x = load(of_rigid.x, source);
         for (int d = 0; d < 3; ++d) x[d] += images.shift(image, d);
+        for (int d = 0; d < 3; ++d) {
+          const int turns = images.laps(rigid_body, d) - images.laps_then(rigid_body, d);
+          x += static_cast<double>(turns) * images.period[d];
+        }
         store(to.x, v, x);
         store(to.v, v, load(of_rigid.v, source));
       });

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "cells/topology.hpp"
-#include "contact/join_positions.hpp"
 #include "membrane/interface.hpp"
 
 namespace corpuscle {
@@ -40,18 +39,23 @@ std::vector<int> differences(const std::vector<int>& first) {
 
 }  // namespace
 
-JoinedSurfaces::JoinedSurfaces(const SurfaceSet& rigid, const std::vector<std::pair<int, Vec3>>& images) : rigid_(rigid) {
+JoinedSurfaces::JoinedSurfaces(const SurfaceSet& rigid, const std::vector<std::pair<int, Vec3>>& images, const Table<int>& laps,
+                               const Vec3 (&period)[3])
+    : rigid_(rigid) {
   rigid_vertices_ = differences(values_of(rigid.first_vertex, rigid.bodies + 1));
   rigid_triangles_ = differences(values_of(rigid.first_triangle, rigid.bodies + 1));
-  image_body_ = Array<int>("corpuscle::contact::image_body", images.size() + 1);
-  image_shift_ = Table<double>("corpuscle::contact::image_shift", images.size() + 1, 3);
-  const auto shift = Kokkos::create_mirror_view(image_shift_);
+  images_.body = Array<int>("corpuscle::contact::image_body", images.size() + 1);
+  images_.shift = Table<double>("corpuscle::contact::image_shift", images.size() + 1, 3);
+  images_.laps = laps.data() ? laps : Table<int>("corpuscle::contact::no_laps", rigid.bodies, 3);
+  images_.laps_then = Table<int>("corpuscle::contact::laps_then", rigid.bodies, 3);
+  for (int d = 0; d < 3; ++d) images_.period[d] = period[d];
+  const auto shift = Kokkos::create_mirror_view(images_.shift);
   for (std::size_t m = 0; m < images.size(); ++m) {
     body_.push_back(images[m].first);
     for (int d = 0; d < 3; ++d) shift(m, d) = images[m].second[d];
   }
-  Kokkos::deep_copy(image_shift_, shift);
-  fill(image_body_, body_);
+  Kokkos::deep_copy(images_.shift, shift);
+  fill(images_.body, body_);
 }
 
 void JoinedSurfaces::make_room() {
@@ -95,11 +99,21 @@ void JoinedSurfaces::take_up(const SurfaceSet& cells, const SurfaceSet& template
   fill(type_, types);
   if (set_.cells > 0) fill_topology(templates, type_, set_, 0, set_.cells);
   if (set_.bodies > set_.cells) fill_topology(rigid_, type_, set_, set_.cells, set_.bodies);
+  Kokkos::deep_copy(images_.laps_then, images_.laps);
   update(cells);
 }
 
+bool JoinedSurfaces::turned() const {
+  const auto now = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), images_.laps);
+  const auto then = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), images_.laps_then);
+  for (int body = 0; body < rigid_.bodies; ++body)
+    for (int d = 0; d < 3; ++d)
+      if (now(body, d) != then(body, d)) return true;
+  return false;
+}
+
 void JoinedSurfaces::update(const SurfaceSet& cells) const {
-  join_positions(cells, rigid_, {image_body_, image_shift_}, set_);
+  join_positions(cells, rigid_, images_, set_);
 }
 
 void JoinedSurfaces::give_back(const SurfaceSet& cells) const { copy_vertices(cells.own_vertices, set_.x, cells.x); }

@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/vec3.hpp"
-#include "immersed/surface_views.hpp"
+#include "contact/join_positions.hpp"
 
 namespace corpuscle {
 
@@ -14,10 +13,14 @@ class JoinedSurfaces {
  public:
   /// @param rigid   rigid bodies alone; they move on
   /// @param images  which of them are seen, and by how much each is shifted, um
-  JoinedSurfaces(const SurfaceSet& rigid, const std::vector<std::pair<int, Vec3>>& images);
+  /// @param laps    [rigid body, 3] periods by which each has been moved back, which changes; may be empty
+  /// @param period  um; zero along directions that are not periodic
+  JoinedSurfaces(const SurfaceSet& rigid, const std::vector<std::pair<int, Vec3>>& images, const Table<int>& laps, const Vec3 (&period)[3]);
 
   /// The cells are others from now on: those of `cells`, of the types `type` [body] in `templates`.
   void take_up(const SurfaceSet& cells, const SurfaceSet& templates, const Array<int>& type);
+  /// Whether a rigid body has come back through a periodic side since then: its images are then to be taken up anew.
+  bool turned() const;
   /// Positions and velocities as they are at present.
   void update(const SurfaceSet& cells) const;
   /// Positions of this rank's own cells, as contact has left them.
@@ -35,8 +38,7 @@ class JoinedSurfaces {
   SurfaceSet rigid_, set_;
   std::vector<int> body_;                        // [image]
   std::vector<int> rigid_vertices_, rigid_triangles_;  // [rigid body]
-  Array<int> image_body_;
-  Table<double> image_shift_;
+  RigidImages images_;
   Array<int> type_;
 };
 

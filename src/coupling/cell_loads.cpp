@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cells/rank_blocks.hpp"
+#include "coupling/periodic_frame.hpp"
 #include "core/error.hpp"
 #include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
@@ -57,6 +58,8 @@ double farthest(const SurfaceSet& templates) {
   return stretched * most;
 }
 
+bool moves(const BodySettings& body) { return body.velocity_um_per_us != Triple{} || body.angular_velocity_rad_per_us != Triple{}; }
+
 /// Images of rigid bodies that this rank's cells may come to meet, whose middles are within `block`. Those of bodies that move are all.
 std::vector<std::pair<int, Vec3>> images_of(const Case& scene, const SurfaceSet& rigid, const Grid& grid, SpaceBox block, double reach) {
   const auto x = host_of(rigid.x);
@@ -64,11 +67,9 @@ std::vector<std::pair<int, Vec3>> images_of(const Case& scene, const SurfaceSet&
   widen(block, reach);
   std::vector<std::pair<int, Vec3>> images;
   for (int b = 0; b < rigid.bodies; ++b) {
-    const BodySettings& body = scene.bodies[b];
-    const bool moves = body.velocity_um_per_us != Triple{} || body.angular_velocity_rad_per_us != Triple{};
     const SpaceBox here = box_of(x, first(b), first(b + 1));
     for (const Vec3& shift : period_shifts(grid))
-      if (moves || overlap(block, {here.lower + shift, here.upper + shift})) images.emplace_back(b, shift);
+      if (moves(scene.bodies[b]) || overlap(block, {here.lower + shift, here.upper + shift})) images.emplace_back(b, shift);
   }
   return images;
 }
@@ -80,7 +81,7 @@ bool CellLoads::wanted(const Case& scene) {
 }
 
 CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
-                     std::shared_ptr<Workspace> workspace, const SurfaceSet* rigid)
+                     std::shared_ptr<Workspace> workspace, ImmersedFlow* rigid)
     : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer), workspace_(std::move(workspace)) {
   if (scene.contact) {
     const double blend = scene.coupling->slip ? slip_reach * comm_.max(transfer.largest_spacing()) : 0;
@@ -95,8 +96,11 @@ CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& tran
     refuse_thin_blocks(scene.contact->range_um);
     if (rigid) {
       const double reach = farthest(membranes_.templates()) + 2 * contact_->reach();
-      joined_ = std::make_unique<JoinedSurfaces>(
-          *rigid, images_of(scene, *rigid, grid, {transfer.search().lower, transfer.search().upper}, reach));
+      const SpaceBox block{transfer.search().lower, transfer.search().upper};
+      const PeriodicFrame frame = periodic_frame(grid);
+      joined_ = std::make_unique<JoinedSurfaces>(rigid->surfaces(), images_of(scene, rigid->surfaces(), grid, block, reach),
+                                                 rigid->boundary().laps(), frame.period);
+      bodies_move_ = rigid->boundary().periodic() && std::any_of(scene.bodies.begin(), scene.bodies.end(), moves);
     }
   }
   for (std::size_t c = 0; c < scene.cells.size(); ++c)

@@ -6,6 +6,7 @@
 
 #include "contact/contact.hpp"
 #include "contact/joined_surfaces.hpp"
+#include "coupling/immersed_flow.hpp"
 #include "contact/wall_contact.hpp"
 #include "cells/shared_cells.hpp"
 #include "transfer/transfer.hpp"
@@ -16,15 +17,17 @@ class CellLoads {
  public:
   /// @param viscosity  mPa s, of the fluid between cells
   /// @param workspace  shared with others that do not use it in the calls below
-  /// @param rigid      rigid bodies that cells meet; null for none
+  /// @param rigid      with the rigid bodies that cells meet, where they are at the start; null for none
   /// @throws InputError  where walls act beyond the blocks beside them
   CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
-            std::shared_ptr<Workspace> workspace, const SurfaceSet* rigid = nullptr);
+            std::shared_ptr<Workspace> workspace, ImmersedFlow* rigid = nullptr);
   /// Whether a case has any.
   static bool wanted(const Case& scene);
 
   /// The cells at hand are others from now on. look() must follow, with valid copies.
   void take_up();
+  /// Whether they have come back through periodic sides: take_up() must follow.
+  bool bodies_turned() const { return joined_ && bodies_move_ && joined_->turned(); }
   /// The rigid bodies have moved.
   void follow_bodies();
   /// Membranes and rigid bodies; null where there are none of these.
@@ -74,6 +77,7 @@ class CellLoads {
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<Contact> contact_;        // only with [contact]
   std::unique_ptr<JoinedSurfaces> joined_;  // and rigid bodies
+  bool bodies_move_ = false;                // through periodic sides
   WallSides walls_;
   Components<double> force_;  // [vertex, 3] nN
   double smallest_wall_gap_ = 1e30;  // um

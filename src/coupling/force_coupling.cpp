@@ -66,7 +66,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   }
   if (CellLoads::wanted(scene))
     loads_ = std::make_unique<CellLoads>(scene, *cells_, *transfer_, fluid.grid(), fluid.viscosity(), workspace_,
-                                         bodies_ ? &bodies_->surfaces() : nullptr);
+                                         bodies_ ? bodies_->immersed() : nullptr);
   fluid.set_face_force(transfer_->faces());
   std::vector<double> ratios;
   for (const CellReference& type : membranes_->types()) ratios.push_back(type.viscosity_ratio);
@@ -425,10 +425,12 @@ void ForceCoupling::limit_slip(double dt) {
   cells_->to_copies(followed_);
 }
 
-/// Cells that have come to this rank, or copies that are others than before, are looked at where the last step left them.
+/// Cells that have come to this rank, copies that are others than before, and bodies that have come back through a side, are looked at
+/// where the last step left them.
 void ForceCoupling::begin_step(double time, double dt, double ahead) {
-  if (!cells_->begin_step(ahead)) return;
-  take_up();
+  const bool others = cells_->begin_step(ahead);
+  if (!others && !(loads_ && loads_->bodies_turned())) return;
+  if (others) take_up();
   if (!loads_) return;
   loads_->take_up();
   update_copies();
@@ -467,6 +469,7 @@ void ForceCoupling::after_move(double time, double dt) {
 void ForceCoupling::resume(double time) {
   if (bodies_) bodies_->resume(time);
   if (!loads_) return;
+  if (loads_->bodies_turned()) loads_->take_up();
   update_copies();
   look(time, next_step_us(time, lengths_us_.front()));
 }

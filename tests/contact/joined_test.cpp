@@ -37,7 +37,9 @@ TEST_CASE("cells and the images of rigid bodies are joined as if made together",
   const auto host = Kokkos::create_mirror_view(type);
   host(0) = 1, host(1) = 0, host(2) = 1;
   Kokkos::deep_copy(type, host);
-  JoinedSurfaces joined(rigid, {{0, {}}, {1, {}}, {0, shift}});
+  const Table<int> laps("corpuscle::test::laps", 2, 3);
+  const Vec3 period[3] = {{}, {}, shift};
+  JoinedSurfaces joined(rigid, {{0, {}}, {1, {}}, {0, shift}}, laps, period);
   joined.take_up(cells, templates, type);
   const SurfaceSet& set = joined.set();
   REQUIRE(set.bodies == 6);
@@ -63,4 +65,16 @@ TEST_CASE("cells and the images of rigid bodies are joined as if made together",
   const auto x = on_host(set.x), first = on_host(together.x);
   CHECK(load(x, set.vertices - 1).x == Approx(load(first, set.vertices - 1).x + 0.5));
   CHECK(load(x, set.vertices - 1).z == load(first, set.vertices - 1).z);
+
+  // A body that comes back at the other end goes on here, until the images are taken up anew.
+  move_vertices(rigid, [](int body, const Vec3& at) { return body == 0 ? at - Vec3{0, 0, 12} : at; });
+  const auto turns = Kokkos::create_mirror_view(laps);
+  turns(0, 2) = 1;
+  Kokkos::deep_copy(laps, turns);
+  CHECK(joined.turned());
+  joined.update(cells);
+  CHECK(load(on_host(set.x), set.vertices - 1).z == Approx(load(first, set.vertices - 1).z));
+  joined.take_up(cells, templates, type);
+  CHECK_FALSE(joined.turned());
+  CHECK(load(on_host(set.x), set.vertices - 1).z == Approx(load(first, set.vertices - 1).z - 12));
 }
