@@ -148,10 +148,9 @@ class CaseReader {
                                      [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::outflow; });
     note(given("time", "stop_before_outflow_um") && !outflow,
          fmt::format("time.stop_before_outflow_um = {:g} has no effect: no side is an \"outflow\"", time.stop_before_outflow_um));
-    if (follows_late(scene) && given("time", "first_step_us") && time.first_step_us == 0)
-      note(true, fmt::format("time.first_step_us = 0: with membrane viscosity in a fluid that is everywhere the first steps follow a load "
-                             "late, and what they leave lasts: leave the key out, for first steps of {:g} us, or reduce time.step_us",
-                             time.step_us / 16));
+    note(follows_late(scene) && given("time", "first_step_us") && time.first_step_us == 0,
+         "time.first_step_us = 0: with membrane viscosity in a fluid that is everywhere the first steps follow a load late, and "
+         "what they leave lasts: leave the key out, for short ones, or reduce time.step_us");
   }
 
   static void note_often_history(Case& scene) {

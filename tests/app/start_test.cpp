@@ -28,9 +28,11 @@ TEST_CASE("a load that acts at once on viscous membranes is followed by the firs
     return report(folder / "out")["quantities"]["cell_0_centroid_z_um"].get<double>() + 1.6;
   };
   const double fine = way({"time.step_us=0.625", "time.first_step_us=0"});
-  // The lag is of first order in the first steps: measured 6 and 100 %.
-  CHECK(std::abs(way({}) / fine - 1) < 0.12);
-  CHECK(std::abs(way({"time.first_step_us=0"}) / fine - 1) > 0.3);
+  // What a late start adds to the way grows with the first steps, which are a sixteenth: with doubling a quarter at most.
+  const double late = way({"time.first_step_us=0"}) / fine - 1, now = way({}) / fine - 1;
+  INFO(late << " " << now);
+  CHECK(late > 0.3);
+  CHECK(std::abs(now) < 0.25 * late);
 }
 
 TEST_CASE("cells beside a wall without contact, and deep in each other's repulsion, are warned of") {
