@@ -100,7 +100,7 @@ inline double least_wall_gap(const WallContacts& contacts) {
   const WallContacts c = contacts;
   double least = 1e30;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::least_wall_gap", Policy(0, c.markers.count),
+      "corpuscle::coupling::least_wall_gap", Policy(0, c.markers.count),
       KOKKOS_LAMBDA(int marker, double& sum) { sum = smaller(sum, c.of(marker).gap); }, Smallest(least));
   return least;
 }
