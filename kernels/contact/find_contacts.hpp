@@ -108,35 +108,23 @@ inline void gaps_to_others(const SurfaceSet& surface, const ContactLists& lists,
       });
 }
 
-/// um to the own body, of all vertices; 1e30 where nothing is within reach.
-inline double least_own_gap(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts) {
-  const SurfaceSet s = surface;
-  const ContactLists in = lists;
-  const ContactViews c = contacts;
-  double least = 1e30;
-  Kokkos::parallel_reduce(
-      "corpuscle::contact::least_own_gap", Policy(0, s.vertices),
-      KOKKOS_LAMBDA(int v, double& sum) {
-        for (int g = in.first_group(v); g < in.first_group(v + 1); ++g)
-          if (c.item(g) >= 0 && same_body(s, v, c.item(g))) sum = smaller(sum, c.gap(g));
-      },
-      Smallest(least));
-  return least;
-}
+/// Between what a gap is: within one body, between two membranes, or between a membrane and a rigid body.
+enum class GapWithin { body, membranes, bodies };
 
-/// um between membranes and rigid bodies, or else between membranes, of all vertices; 1e30 where nothing is within reach.
-inline double least_gap_to(bool rigid, const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts) {
+/// um, the least of all vertices; 1e30 where nothing is within reach.
+inline double least_gap(GapWithin within, const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts) {
   const SurfaceSet s = surface;
   const ContactLists in = lists;
   const ContactViews c = contacts;
   double least = 1e30;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::least_gap_to", Policy(0, s.vertices),
+      "corpuscle::contact::least_gap_within", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, double& sum) {
         for (int g = in.first_group(v); g < in.first_group(v + 1); ++g) {
-          if (c.item(g) < 0 || same_body(s, v, c.item(g))) continue;
-          const bool of_rigid = s.vertex_body(v) >= s.cells || s.triangle_body(item_triangle(s, c.item(g))) >= s.cells;
-          if (of_rigid == rigid) sum = smaller(sum, c.gap(g));
+          if (c.item(g) < 0) continue;
+          const bool rigid = s.vertex_body(v) >= s.cells || s.triangle_body(item_triangle(s, c.item(g))) >= s.cells;
+          const GapWithin what = same_body(s, v, c.item(g)) ? GapWithin::body : rigid ? GapWithin::bodies : GapWithin::membranes;
+          if (what == within) sum = smaller(sum, c.gap(g));
         }
       },
       Smallest(least));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fluid/boundary_conditions.hpp"
 #include "fluid/flow_balances.hpp"
 
 namespace corpuscle {
@@ -254,9 +255,7 @@ double plasma_speed(const Case& scene, const GuidedFlow& flow) {
 
 void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
                       const Components<double>& stress) {
-  WallSides sides;
-  for (const auto& side : boundaries)
-    sides.wall[static_cast<int>(side.side) / 2][static_cast<int>(side.side) % 2] = is_wall(side);
+  const WallSides sides = walls_of(boundaries);
   const auto find = fluid.skewed() ? wall_stress_field<true> : wall_stress_field<false>;
   find(fluid.grid().views(), fluid.coefficients(), sides, fluid.viscosity(), fluid.velocity(), stress);
 }

@@ -305,8 +305,9 @@ void Contact::look(double time, double dt) {
 /// Of all ranks together.
 void Contact::note_gaps() {
   const bool rigid = surface_.bodies > surface_.cells;
-  double least[3] = {rigid ? least_gap_to(false, surface_, lists_, now_) : least_of(surface_.vertices, gap_), least_own_gap(surface_, lists_, now_),
-                     rigid ? least_gap_to(true, surface_, lists_, now_) : far_away};
+  const auto within = [&](GapWithin what) { return least_gap(what, surface_, lists_, now_); };
+  double least[3] = {rigid ? within(GapWithin::membranes) : least_of(surface_.vertices, gap_), within(GapWithin::body),
+                     rigid ? within(GapWithin::bodies) : far_away};
   if (peers_)
     for (double& gap : least) gap = peers_->comm.min(gap);
   report_.smallest_gap = std::min(report_.smallest_gap, least[0]);

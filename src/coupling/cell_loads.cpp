@@ -7,6 +7,7 @@
 #include "cells/rank_blocks.hpp"
 #include "coupling/periodic_frame.hpp"
 #include "core/error.hpp"
+#include "fluid/boundary_conditions.hpp"
 #include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
 
@@ -15,16 +16,6 @@ namespace corpuscle {
 namespace {
 
 bool pushed(const CellSettings& cell) { return cell.push_nN != Triple{}; }
-
-WallSides walls_of(const Case& scene) {
-  WallSides walls;
-  for (const auto& boundary : scene.boundaries) {
-    const int side = static_cast<int>(boundary.side);
-    walls.wall[side / 2][side % 2] =
-        boundary.type == BoundarySettings::Type::wall || boundary.type == BoundarySettings::Type::moving_wall;
-  }
-  return walls;
-}
 
 template <class View>
 auto host_of(const View& view) {
@@ -92,7 +83,7 @@ CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& tran
                              },
                              workspace_};
     contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
-    walls_ = walls_of(scene);
+    walls_ = walls_of(scene.boundaries);
     refuse_thin_blocks(scene.contact->range_um);
     if (rigid) {
       const double reach = farthest(membranes_.templates()) + 2 * contact_->reach();

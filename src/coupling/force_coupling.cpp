@@ -202,8 +202,8 @@ void ForceCoupling::check_start() {
   if (outflow_.distance < outflow_limit_) {
     outflow_limit_ = 0.5 * outflow_.distance;
     warn(
-        "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left instead of time.stop_before_outflow_um = {:g}; move the cell (center_um) or "
-        "lengthen the grid",
+        "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left instead of "
+        "time.stop_before_outflow_um = {:g}; move the cell (center_um) or lengthen the grid",
         nearest_outflow(), outflow_limit_, scene_.time.stop_before_outflow_um);
   }
   warn_of_image();

@@ -8,6 +8,7 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/force_coupling.hpp"
+#include "fluid/boundary_conditions.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "transfer/vertex_forces.hpp"
 
@@ -95,12 +96,7 @@ void ForceCoupling::check_packing() {
   packing_->gaps_seen_um = settings.range_um;
   packing_->smallest_gap_um =
       comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
-  WallSides sides;
-  for (const auto& boundary : scene_.boundaries) {
-    const int side = static_cast<int>(boundary.side);
-    sides.wall[side / 2][side % 2] =
-        boundary.type == BoundarySettings::Type::wall || boundary.type == BoundarySettings::Type::moving_wall;
-  }
+  const WallSides sides = walls_of(scene_.boundaries);
   const double to_side =
       sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);

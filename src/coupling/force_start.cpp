@@ -6,6 +6,7 @@
 #include "contact/wall_contact.hpp"
 #include "core/log.hpp"
 #include "coupling/force_coupling.hpp"
+#include "fluid/boundary_conditions.hpp"
 
 namespace corpuscle {
 
@@ -29,12 +30,7 @@ double shear_modulus(const MembraneLaw& law) {
 void ForceCoupling::warn_of_walls() const {
   constexpr double near = 0.5;  // spacings
   if (loads_ && loads_->report()) return;
-  WallSides sides;
-  for (const auto& boundary : scene_.boundaries) {
-    const int side = static_cast<int>(boundary.side);
-    sides.wall[side / 2][side % 2] =
-        boundary.type == BoundarySettings::Type::wall || boundary.type == BoundarySettings::Type::moving_wall;
-  }
+  const WallSides sides = walls_of(scene_.boundaries);
   if (!sides.any()) return;
   const Comm& comm = fluid_.grid().comm();
   const double spacing = fluid_.grid().mean_spacing();

@@ -230,6 +230,16 @@ void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape
   largest_speed_ = std::max(largest_speed_, strongest * grid_->comm().max(largest));
 }
 
+WallSides walls_of(const std::vector<BoundarySettings>& boundaries) {
+  using Type = BoundarySettings::Type;
+  WallSides walls;
+  for (const auto& boundary : boundaries) {
+    const int side = static_cast<int>(boundary.side);
+    walls.wall[side / 2][side % 2] = boundary.type == Type::wall || boundary.type == Type::moving_wall;
+  }
+  return walls;
+}
+
 double time_factor(const BoundarySettings& s, double t) {
   const double ramp = s.ramp_us > 0 ? std::clamp(t / s.ramp_us, 0.0, 1.0) : 1.0;
   return ramp * (s.time_table.empty() ? 1.0 : interpolate(s.time_table, t));

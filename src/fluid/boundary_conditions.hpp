@@ -4,6 +4,7 @@
 #include "fluid/boundary.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid.hpp"
+#include "grid/wall_sides.hpp"
 
 #include <string>
 
@@ -12,6 +13,9 @@ namespace corpuscle {
 /// What the velocities of an inlet or moving wall are multiplied with at time t, us: linear between the ends of its ramp
 /// and the rows of its table, constant beyond.
 double time_factor(const BoundarySettings& settings, double t);
+
+/// Which sides are walls, at rest or moving.
+WallSides walls_of(const std::vector<BoundarySettings>& boundaries);
 
 class BoundaryConditions {
  public:

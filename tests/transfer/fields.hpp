@@ -125,6 +125,24 @@ inline double face_sum(const Transfer& transfer, const std::function<double(int,
   return Comm().sum(sum);
 }
 
+/// Of the force across the faces of this rank, from that on a grid which is not cut, over the largest of it.
+inline double largest_difference(const Transfer& of_ranks, const Transfer& of_one) {
+  const IndexSpace &index = of_ranks.block().index(), &whole = of_one.block().index();
+  double largest = 0, off = 0;
+  for (int d = 0; d < 3; ++d) {
+    const auto mine = on_host(of_ranks.faces().across[d]), all = on_host(of_one.faces().across[d]);
+    const CellBox box = face_box(index, d);
+    for (int k = box.lower[2]; k < box.upper[2]; ++k)
+      for (int j = box.lower[1]; j < box.upper[1]; ++j)
+        for (int i = box.lower[0]; i < box.upper[0]; ++i) {
+          const double exact = all(whole.cell(index.first[0] + i, index.first[1] + j, index.first[2] + k));
+          largest = std::max(largest, std::abs(exact));
+          off = std::max(off, std::abs(mine(index.cell(i, j, k)) - exact));
+        }
+  }
+  return off / largest;
+}
+
 inline double largest_error(const Components<double>& v, const Components<double>& x,
                      const std::function<Triple(const Triple&)>& velocity) {
   const auto at = on_host(x);
