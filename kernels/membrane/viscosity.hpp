@@ -2,7 +2,9 @@
 // iterations of a cell's conjugate gradients.
 #pragma once
 
+#include "membrane/interface.hpp"
 #include "membrane/motion.hpp"
+#include "membrane/stiffness.hpp"
 
 namespace corpuscle {
 
@@ -50,6 +52,7 @@ struct ViscosityViews {
   Components<double> residual, search, image;  // [vertex, 3]
   Components<double> inverse_gradient;         // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
   Array<int> iterations;                       // [cell] of the last velocity solve; negative if it did not converge
+  double times = 1;                            // of D on the left-hand side
 };
 
 /// The neighbour that ring entry r of a vertex leads to: the next corner of that triangle.
@@ -70,20 +73,50 @@ KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const ViscosityViews
   return sum;
 }
 
-/// The fluid around membranes that move with it: it moved with U under the force that it had last, and takes beta more for each
-/// area and each velocity beyond U. `force`: all others on the membrane.
+/// The fluid around membranes that move with it: it moved with U under the force that it had last, and takes R = beta A + share D more
+/// for each velocity beyond U. As a linear operator on the membrane D grows with the wave number as the fluid's answer does, only
+/// faster: with a share of it short waves need not wait for what is right for long ones. R U less the force is carried on in time from
+/// the last two steps. `force`: all others on the membrane.
 struct FluidReaction {
-  double beta;  // mPa s/um
+  double beta;   // mPa s/um
+  double share;  // of D
+  double ahead;  // the step over the last one; 0 to take what the last one left
   Components<double> velocity, last_force, force;  // [vertex, 3] U, um/us; nN
+  Components<double> past;  // [vertex, 3] nN, R U less the force, of the step before the last; becomes that of the last one. Zero
+                            // at rest
 };
 
-/// What drives vertex i, from inside the membrane and outside, nN.
+/// Of D, besides itself, on the left-hand side.
 template <class Load>
-KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const Load& outside, int i, double area) {
+KOKKOS_INLINE_FUNCTION double share_of_damping(const Load&) {
+  return 0;
+}
+KOKKOS_INLINE_FUNCTION double share_of_damping(const FluidReaction& fluid) { return fluid.share; }
+
+/// What an edge to j adds to D U.
+template <class Damping, class Load>
+KOKKOS_INLINE_FUNCTION Vec3 edge_reaction(const Load&, const CellLaw&, int, int, const Vec3&) {
+  return {};
+}
+template <class Damping>
+KOKKOS_INLINE_FUNCTION Vec3 edge_reaction(const FluidReaction& fluid, const CellLaw& law, int i, int j, const Vec3& along) {
+  return Damping::force(law, load(fluid.velocity, i) - load(fluid.velocity, j), along);
+}
+
+/// Of what changed in the last step: with all of it nothing would be late, but what is wrong at first, late by n steps without it, would
+/// swing for as long; with this it dies away in ten steps, and what grows is late by n / 10.
+constexpr double carried_on = 0.9;
+
+/// What drives vertex i, from inside the membrane and outside, nN. @param damping  D U there
+template <class Load>
+KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const Load& outside, int i, double area, const Vec3&) {
   return gather_force(m, i) + outside.force(m, i, area);
 }
-KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReaction& fluid, int i, double area) {
-  return (fluid.beta * area) * load(fluid.velocity, i) + load(fluid.force, i) - load(fluid.last_force, i);
+KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReaction& fluid, int i, double area, const Vec3& damping) {
+  const Vec3 last = (fluid.beta * area) * load(fluid.velocity, i) + fluid.share * damping - load(fluid.last_force, i);
+  const Vec3 before = load(fluid.past, i);
+  store(fluid.past, i, last);
+  return load(fluid.force, i) + last + carried_on * fluid.ahead * (last - before);
 }
 
 /// Right-hand side, diagonal, preconditioner and volume gradient at the current positions.
@@ -98,7 +131,8 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
         store(w.gradient, i, gather_area(m, i, area));
         const double diagonal = inertia + outside.beta * area;
         w.diagonal(i) = diagonal;
-        store(w.right_side, i, inertia * load(v, i) + driving_force(m, outside, i, area));
+        const double times = 1 + share_of_damping(outside);
+        Vec3 reaction;
         Symmetric3 b;
         const int first = m.surface.ring_start(i), last = m.surface.ring_start(i + 1);
         for (int r = first; r < last; ++r) {
@@ -108,11 +142,13 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
           e *= inverse_length;
           w.neighbour(r) = j;
           w.inverse_length(r) = inverse_length;
-          const double c = law.central_damping;
+          reaction += edge_reaction<Damping>(outside, law, i, j, e);
+          const double c = times * law.central_damping;
           b.xx += c * e.x * e.x, b.yy += c * e.y * e.y, b.zz += c * e.z * e.z;
           b.xy += c * e.x * e.y, b.xz += c * e.x * e.z, b.yz += c * e.y * e.z;
         }
-        const double d = diagonal + (last - first) * Damping::isotropic(law);
+        store(w.right_side, i, inertia * load(v, i) + driving_force(m, outside, i, area, reaction));
+        const double d = diagonal + times * (last - first) * Damping::isotropic(law);
         b.xx += d, b.yy += d, b.zz += d;
         const Symmetric3 inv = inverse(b);
         const double entries[6] = {inv.xx, inv.yy, inv.zz, inv.xy, inv.xz, inv.yz};
@@ -120,7 +156,7 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
       });
 }
 
-/// The matrix of one cell, beta A + D (+ M/dt), and block Jacobi for it; sums over the cell by one team.
+/// The matrix of one cell, beta A + D (+ M/dt), of which D counts w.times, and block Jacobi for it; sums over the cell by one team.
 template <class Damping>
 struct ViscousMatrix {
   MembraneViews m;
@@ -133,7 +169,7 @@ struct ViscousMatrix {
 
   template <class Velocity>
   KOKKOS_INLINE_FUNCTION Vec3 apply(const CellLaw& law, const Velocity& v, int i) const {
-    return w.diagonal(i) * load(v, i) + damping_at<Damping>(m.surface, w, law, v, i);
+    return w.diagonal(i) * load(v, i) + w.times * damping_at<Damping>(m.surface, w, law, v, i);
   }
 
   template <class Term>
@@ -355,6 +391,18 @@ void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Com
         store(m.force, i, load(m.force, i) - taken);
         if (two) store(force, i, load(force, i) - taken);
       });
+}
+
+/// mode = D times the unit mode; `probe` is overwritten.
+template <class Damping>
+void damp_mode(const MembraneViews& m, const ViscosityViews& w, const StiffnessViews& work) {
+  Kokkos::parallel_for(
+      "corpuscle::membrane::damp_mode", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
+        const int cell = m.surface.vertex_body(i);
+        const Vec3 damped = damping_at<Damping>(m.surface, w, m.law(m.type(cell)), work.mode, i);
+        store(work.probe, i, (1 / std::sqrt(section_total(work.sums, cell, 0))) * damped);
+      });
+  copy_vertices(m.vertices, work.probe, work.mode);
 }
 
 /// D v for given velocities, into `force` with its sign: the dissipative force on each vertex, nN.

@@ -61,7 +61,7 @@ struct BandedViscousSolve {
         const Vec3 along = w.inverse_length(r) * (load(s.x, j) - here);
         for (int a = 0; a < 3; ++a)
           for (int c = 0; c < 3; ++c) {
-            const double value = coupling(law, along, a, c);
+            const double value = w.times * coupling(law, along, a, c);
             if (c >= a) column[a][c - a] += value;
             if (q > p) column[a][3 * (q - p) + c - a] = -value;
           }

@@ -109,6 +109,7 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
   wrong = agree(comm, wrong);
   if (!wrong.empty()) throw InputError(wrong);
   cells.restore(records, carried, owners, static_cast<long>(numbers[0]));
+  if (columns_stored < width) cells.membranes().resist_anew();
 }
 
 }  // namespace corpuscle

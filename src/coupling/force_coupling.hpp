@@ -102,6 +102,7 @@ class ForceCoupling : public Coupling {
   void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
   void measure_stability();
+  void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers);
   void refuse_long_steps() const;
   double next_step_us(double time_us, double dt_us) const;
 
@@ -117,7 +118,8 @@ class ForceCoupling : public Coupling {
   std::optional<PackedShare> packed_;
   double packed_gap_ = 0;                 // um, the least of the populations'
   int packed_listed_ = 0;                 // cells of the scene that are not packed
-  double small_stable_us_ = 0;            // the largest stable step of packed cells before they have grown
+  double small_stable_us_ = 0;            // stable_us_ and short_waves_ of packed cells before they have grown
+  double small_short_waves_ = 0;
   bool grows_ = false;                    // packed cells are still smaller than they are to be, and must grow
   bool small_ = false;                    // or are about to be replaced by those of a checkpoint
   Membranes* membranes_;                        // theirs
@@ -134,6 +136,7 @@ class ForceCoupling : public Coupling {
     double area = 0, radius = 0, wave_number_square = 0;
   } softest_;
   double stable_us_ = 0;      // largest stable step at the start
+  double short_waves_ = 0;    // share of membrane viscosity that the fluid's answer to short waves is taken for
   double outflow_limit_ = 0;  // um
   NearSide outflow_;          // at the last place()
 };

@@ -66,16 +66,22 @@ std::string gap_text(double gap, double seen) {
 /// Of packed cells that have grown: a restart begins with them as small as packing did.
 std::vector<double> ForceCoupling::state() const {
   if (!packed_ || packed_->size == 1) return {};
-  return {stable_us_, softest_.area, softest_.radius, small_stable_us_};
+  return {stable_us_, softest_.area, softest_.radius, small_stable_us_, short_waves_, small_short_waves_};
 }
 
-/// The limit of the grown cells, which are not at hand: it changes with properties as that of the small ones does.
+/// What is found of the grown cells, which are not at hand: it changes with properties as that of the small ones does.
 /// @throws InputError  for steps that are longer
 void ForceCoupling::set_state(const std::vector<double>& state) {
   constexpr double rounding = 1e-9;  // on other ranks
-  const double change = stable_us_ / state.at(3);
+  const auto of_grown = [](double small, double small_then, double grown_then) {
+    const double change = small / small_then;
+    return (std::abs(change - 1) < rounding ? 1 : change) * grown_then;
+  };
   small_stable_us_ = stable_us_;
-  stable_us_ = (std::abs(change - 1) < rounding ? 1 : change) * state[0];
+  stable_us_ = of_grown(small_stable_us_, state.at(3), state.at(0));
+  small_short_waves_ = short_waves_;
+  if (short_waves_ > 0 && state.at(5) > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
+  membranes_->take_share_of_resistance(short_waves_);
   softest_.area = state.at(1);
   softest_.radius = state.at(2);
   refuse_long_steps();
@@ -122,6 +128,7 @@ void ForceCoupling::inflate() {
     find_softest();
     measure_stability();
     small_stable_us_ = stable_us_;
+    small_short_waves_ = short_waves_;
     still();
     loads_->look(0, pace_us);
     long step = 0;

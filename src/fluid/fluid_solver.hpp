@@ -59,6 +59,8 @@ class FluidSolver {
   const FluidSettings& settings() const { return settings_; }
   const FluidStatistics& statistics() const { return statistics_; }
   double viscosity() const { return mu_; }
+  /// The present step over the one before, 0 for a first step.
+  double step_ratio() const { return ratio_; }
   /// Velocity scale of tolerances: never below the largest speed seen.
   void raise_reference_speed(double speed) {
     statistics_.reference_speed = larger(statistics_.reference_speed, speed);

@@ -47,6 +47,7 @@ void fill(const Array<int>& view, const std::vector<int>& values) {
 
 void MembraneViscosity::hold(const MembraneViews& m) {
   extend(given_, "given_vertex", m.vertices);
+  extend(past_, "past_vertex", m.vertices);
   extend(views_.right_side, "right_side_vertex", m.vertices);
   grow(views_.iterations, "iterations_cell", m.cells);
 }

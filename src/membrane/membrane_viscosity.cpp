@@ -90,11 +90,13 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
 template <class Damping>
 void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const {
   constexpr double massless = 1e300;  // us: mass over it
-  assemble_viscous<Damping>(m, views_, fluid, massless);
+  ViscosityViews views = views_;
+  views.times = 1 + fluid.share;
+  assemble_viscous<Damping>(m, views, fluid, massless);
   if (band_.teams > 0)
-    solve_held<Damping>(m, views_, band_);
+    solve_held<Damping>(m, views, band_);
   else
-    solve_held<Damping>(m, views_);
+    solve_held<Damping>(m, views);
   subtract_damping<Damping>(m, views_, m.surface.v, fluid.force, damping);
 }
 
@@ -105,9 +107,10 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction&
     resist_with<CentralDamping>(m, fluid, damping);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force) {
+void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead,
+                               const Components<double>& force) {
   divide_scratch(m, workspace.reserve(scratch_numbers(m)));
-  resist_with(m, {beta, m.surface.v, given_, force}, views_.right_side);
+  resist_with(m, {beta, share_, ahead, m.surface.v, given_, force, past_}, views_.right_side);
   copy_vertices(m.vertices, force, given_);
 }
 
@@ -118,8 +121,25 @@ void MembraneViscosity::relieve(const MembraneViews& m, Workspace& workspace, do
   at_rest.surface.v = work.force_ahead;
   Kokkos::deep_copy(work.force_ahead, 0.0);
   Kokkos::deep_copy(work.force_behind, 0.0);
-  resist_with(at_rest, {beta, work.force_ahead, work.force_behind, work.mode}, work.probe);
+  resist_with(at_rest, {beta, share_, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, work.probe);
   Kokkos::deep_copy(views_.right_side, 0.0);  // nothing has been taken off any force yet
+}
+
+template <class Damping>
+void MembraneViscosity::damp_with(const MembraneViews& m, const StiffnessViews& work) const {
+  assemble_viscous<Damping>(m, views_, FluidReaction{1, 0, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, 1);
+  damp_mode<Damping>(m, views_, work);
+}
+
+void MembraneViscosity::damp(const MembraneViews& m, Workspace& workspace, const StiffnessViews& work) {
+  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
+  Kokkos::deep_copy(work.force_ahead, 0.0);
+  Kokkos::deep_copy(work.force_behind, 0.0);
+  if (tangential_)
+    damp_with<FullDamping>(m, work);
+  else
+    damp_with<CentralDamping>(m, work);
+  Kokkos::deep_copy(views_.right_side, 0.0);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

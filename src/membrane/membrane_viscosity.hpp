@@ -1,6 +1,8 @@
 // Which form of membrane viscosity the cells need, decided once at set-up.
 #pragma once
 
+#include <array>
+
 #include "core/workspace.hpp"
 #include "membrane/elasticity.hpp"
 #include "membrane/reference.hpp"
@@ -17,8 +19,11 @@ class MembraneViscosity {
   void hold(const MembraneViews& m);
   /// Before hold(): matrices of these are factorised, unless they are too large for that.
   void prepare(const std::vector<CellReference>& types);
-  /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step; zero before the first.
-  const Components<double>& given() const { return given_; }
+  /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step, and what FluidReaction needs of the one
+  /// before; zero before the first.
+  std::array<Components<double>, 2> carried() const { return {given_, past_}; }
+  /// Of D, in what the fluid's reaction to short waves is taken for; none at first.
+  void take_share(double share) { share_ = share; }
 
   template <class Load>
   void predict_velocity(const MembraneViews& m, const MotionViews& motion, const Load& load, double dt) const {
@@ -29,14 +34,17 @@ class MembraneViscosity {
     }
   }
 
-  /// See Membranes::resist(): solves (beta A + D) v = beta A U + F - given + q dV/dx for m.surface.v, which holds U, with the
-  /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then. The triangle geometry must be
-  /// current.
-  void resist(const MembraneViews& m, Workspace& workspace, double beta, const Components<double>& force);
+  /// See Membranes::resist(): solves (R + D) v = (R U - given) carried on + F + q dV/dx for m.surface.v, which holds U, with the
+  /// pressure q inside that keeps the volume, and takes D v off the forces F, which are given then; see FluidReaction. The triangle
+  /// geometry must be current.
+  void resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead, const Components<double>& force);
 
   /// What a step leaves of the forces mode [vertex, 3] of membranes that were at rest and gave none: takes D v off them, where
-  /// (beta A + D) v = mode + q dV/dx. The other arrays are overwritten. Only with hold(); otherwise as resist().
+  /// (R + D) v = mode + q dV/dx. The other arrays are overwritten. Only with hold(); otherwise as resist().
   void relieve(const MembraneViews& m, Workspace& workspace, double beta, const StiffnessViews& work);
+
+  /// The forces by which D resists the unit mode, into work.mode; the other arrays are overwritten. As relieve().
+  void damp(const MembraneViews& m, Workspace& workspace, const StiffnessViews& work);
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -55,9 +63,12 @@ class MembraneViscosity {
   template <class Damping>
   void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
   void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
+  template <class Damping>
+  void damp_with(const MembraneViews& m, const StiffnessViews& work) const;
 
   bool tangential_;
-  Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
+  Components<double> given_, past_;  // only with hold(); views_.right_side is then what the last resist() took off
+  double share_ = 0;
   Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
   ViscousBand band_;  // without teams: conjugate gradients

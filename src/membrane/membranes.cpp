@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.hpp"
 #include "membrane/copies.hpp"
@@ -22,6 +23,21 @@ constexpr double step_margin = 0.3;   // of the largest stable step: links stiff
 constexpr double volume_rate = 1e-3;  // share of V0 per us by which a cell that starts away from V0 is brought there
 constexpr int most_retries = 4;
 constexpr int most_substeps = 10000;  // a minute or so for one cell
+
+/// The first of the cells and their vertices.
+MembraneViews up_to(MembraneViews views, int cells, int vertices) {
+  views.cells = cells;
+  views.vertices = vertices;
+  return views;
+}
+
+/// Norm of the modes of some of the cells, the largest.
+double largest_of(const StiffnessViews& work, const std::vector<int>& cells) {
+  const auto sums = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), work.sums);
+  double largest = 0;
+  for (int c : cells) largest = std::max(largest, std::sqrt(sums(c * sections, 0)));
+  return largest;
+}
 
 }  // namespace
 
@@ -72,7 +88,8 @@ void Membranes::make_viscosity() {
 
 std::vector<Components<double>> Membranes::carried() const {
   std::vector<Components<double>> fields{views_.surface.x, views_.surface.v};
-  if (viscosity_) fields.push_back(viscosity_->given());
+  if (viscosity_)
+    for (const Components<double>& field : viscosity_->carried()) fields.push_back(field);
   return fields;
 }
 
@@ -130,10 +147,11 @@ void Membranes::compute_forces() {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
-void Membranes::resist(double beta, const Components<double>& force) {
+void Membranes::resist(double beta, double ahead, const Components<double>& force) {
+  if (std::exchange(resists_anew_, false)) ahead = 0;
   if (!viscosity_ || views_.cells == 0) return;
   Kokkos::deep_copy(views_.status, 0);
-  viscosity_->resist(views_, *workspace_, beta, force);
+  viscosity_->resist(views_, *workspace_, beta, ahead, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
@@ -222,11 +240,34 @@ std::vector<int> Membranes::first_of_types() const {
   return first;
 }
 
-double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta) {
+std::vector<int> Membranes::cells_of(const std::vector<int>& numbers) const {
   std::vector<int> cells;
   for (int c = 0; c < views_.cells; ++c)
     if (std::find(numbers.begin(), numbers.end(), number(c)) != numbers.end()) cells.push_back(c);
+  return cells;
+}
+
+double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta) {
+  const std::vector<int> cells = cells_of(numbers);
   return cells.empty() ? 0 : fastest_relaxation(model, cells, beta);
+}
+
+double Membranes::largest_resistance(const MobilityModel& model, const std::vector<int>& numbers) {
+  const std::vector<int> cells = cells_of(numbers);
+  if (cells.empty() || !viscosity_) return 0;
+  const StiffnessViews work = make_stiffness_views(views_);
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
+  const MembraneViews first_cells = up_to(views_, cells.back() + 1, first(cells.back() + 1));
+  start_mode(views_, work);
+  for (int i = 0; i < power_iterations; ++i) {
+    viscosity_->damp(first_cells, *workspace_, work);
+    for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
+  }
+  return largest_of(work, cells);
+}
+
+void Membranes::take_share_of_resistance(double share) {
+  if (viscosity_) viscosity_->take_share(share);
 }
 
 /// Power iteration on mobility times stiffness, for some of the cells. Of a mode with mobility m, stiffness k and membrane viscosity l
@@ -238,9 +279,7 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
   take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
-  MembraneViews up_to_last = views_;
-  up_to_last.cells = cells.back() + 1;
-  up_to_last.vertices = first(up_to_last.cells);
+  const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
   start_mode(views_, work);
   for (int i = 0; i < power_iterations; ++i) {
     displace(views_, work, distance);
@@ -254,10 +293,7 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
     }
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
   }
-  const auto sums = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), work.sums);
-  double fastest = 0;
-  for (int c : cells) fastest = std::max(fastest, std::sqrt(sums(c * sections, 0)));
-  return fastest;
+  return largest_of(work, cells);
 }
 
 int Membranes::trouble() {

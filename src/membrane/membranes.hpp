@@ -100,9 +100,14 @@ class Membranes {
   /// Of membranes that move with a fluid, once `force` holds all that acts on the fluid but membrane viscosity (views().force, or
   /// that and what else acts), [vertex, 3] nN: take what that resists, as the fluid will move them, off `force` and views().force.
   /// Uses the workspace. surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
-  /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
-  ///              deformations; twice that is too much
-  void resist(double beta, const Components<double>& force);
+  /// @param beta   mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
+  ///               deformations; twice that is too much
+  /// @param ahead  the step over the last one, to carry what the fluid did in the last two on to this one; 0 to take the last
+  void resist(double beta, double ahead, const Components<double>& force);
+  /// The next resist() takes what the fluid did in the last step, whatever it is told: cells had no viscosity in that before.
+  void resist_anew() { resists_anew_ = true; }
+  /// Of membrane viscosity, in what resist() takes for the fluid's answer to short waves: see largest_resistance(). None at first.
+  void take_share_of_resistance(double share);
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
   /// a run warns at its end, beyond the second it is stopped.
@@ -156,6 +161,9 @@ class Membranes {
   /// @param beta     of resist(), for membranes whose viscosity slows them down, but for hold() not at all; before the first step
   double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta = 0);
 
+  /// Largest ratio of membrane viscosity to what the fluid answers to a wave along a membrane; 0 without cells or viscosity. As above.
+  double largest_resistance(const MobilityModel& model, const std::vector<int>& numbers);
+
   /// Remember the present state on the device, or return to it. The copy is allocated at the first save.
   void save_state();
   void restore_state();
@@ -192,6 +200,7 @@ class Membranes {
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
+  std::vector<int> cells_of(const std::vector<int>& numbers) const;
   double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta);
   [[noreturn]] void explain(int cell, double dt);
   [[noreturn]] void explain_area(int cell, double drift) const;
@@ -214,6 +223,7 @@ class Membranes {
   std::vector<double> rest_area_, rest_volume_;  // [cell]
   long calls_ = 0;                               // of advance
   double share_ahead_ = 0;                       // of the last velocities, in the present step's move
+  bool resists_anew_ = false;
   bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()
   std::unique_ptr<Snapshot> saved_;
   std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any
