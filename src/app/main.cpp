@@ -25,6 +25,9 @@
 #ifdef _OPENMP
 #include <omp.h>
 #endif
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace {
 
@@ -80,6 +83,14 @@ void share_cores(const Comm& comm) {
   omp_set_num_threads(std::max(1, omp_get_num_procs() / neighbours));
 #else
   (void)comm;
+#endif
+}
+
+/// Arrays that are freed go back to the system. Else the C library takes ever larger ones from the heap, once some have been freed, and
+/// what is free between those in use stays resident: 46 kB for each cell, of set-up alone.
+void return_freed_arrays() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 128 * 1024);
 #endif
 }
 
@@ -183,6 +194,7 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a failed write, with a message
   std::signal(SIGPIPE, SIG_IGN);  // a run goes on when nobody reads what it says
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
+  return_freed_arrays();
   wait_briefly(argv);
   CLI::App app{"Red blood cells in flowing plasma", "corpuscle"};
   Command command;

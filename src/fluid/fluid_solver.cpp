@@ -87,7 +87,8 @@ void FluidSolver::set_viscosity(const Array<double>& relative, double least, con
   smooth_viscosity_ = fluidity.data() ? Array<double>("corpuscle::fluid::smooth_viscosity", grid_->index().size()) : Array<double>();
   relative_viscosity_ = relative;
   least_viscosity_ = least;
-  for (auto& excess : excess_) excess = Components<double>(uninitialised("corpuscle::fluid::excess_flux"), grid_->index().size(), 3);
+  // Only where cells are it is ever written: what a run takes of memory must not grow as they come to other places.
+  for (auto& excess : excess_) excess = Components<double>("corpuscle::fluid::excess_flux", grid_->index().size(), 3);
   momentum_.reset();
   viscous_hierarchy_ = std::make_unique<MultigridHierarchy>(*grid_, g_.normal);
   make_momentum(*viscous_hierarchy_);
