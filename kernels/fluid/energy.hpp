@@ -73,12 +73,13 @@ inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& 
   return sum_owned("corpuscle::fluid::excess_dissipation", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     double sum = 0;
+    if (v.least != 1 && uniform_beside_body(v, kind, index, c)) return sum;
     for (int d = 0; d < 3; ++d)
       for (int end = 0; end < 2; ++end) {
         const int s = index.stride(d), face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
         if (kind(c) != NodeKind::fluid || (kind(beyond) != NodeKind::fluid && kind(beyond) != NodeKind::boundary)) continue;
         const double r = face_viscosity(v, kind, c, beyond), share = kind(beyond) == NodeKind::boundary ? 1 : 0.5;
-        if (exceeds(v, r)) sum += share * dot(excess_flux(v, r, u, index, d, face), load(u, face) - load(u, face - s));
+        if (exceeds(v, r)) sum += share * dot(excess_flux(v, r, u, kind, index, d, face), load(u, face) - load(u, face - s));
       }
     return sum;
   });

@@ -51,6 +51,21 @@ struct FaceDifferences {
     const int s = index.stride(e);
     return e == d ? value(c) - value(low) : 0.25 * (value(c + s) - value(c - s) + value(low + s) - value(low - s));
   }
+  /// The same of what has no value inside bodies: there the difference towards the other side is taken.
+  template <class Value>
+  KOKKOS_INLINE_FUNCTION Vec3 of(const Value& value, const Array<NodeKind>& kind, const IndexSpace& index, int e) const {
+    if (e == d) return value(c) - value(low);
+    const int s = index.stride(e);
+    const auto known = [&](int at) { return kind(at) != NodeKind::inside; };
+    if (known(c + s) && known(c - s) && known(low + s) && known(low - s)) return of(value, index, e);
+    Vec3 sum;
+    for (const int at : {c, low}) {
+      const bool above = known(at + s), below = known(at - s);
+      if (!above && !below) continue;
+      sum += (above && below ? 0.5 : 1.0) * (value(above ? at + s : at) - value(below ? at - s : at));
+    }
+    return 0.5 * sum;
+  }
   /// The same, across the face of as many values as along it: what is a few cells thick does not look steeper that way.
   KOKKOS_INLINE_FUNCTION double even(const Array<double>& value, const IndexSpace& index, int e) const {
     const int s = index.stride(e);
@@ -99,12 +114,13 @@ inline void smooth_viscosity(const IndexSpace& of_cells, const Array<double>& re
 /// in the end. On the way there it is in the operator: with less than `least` taken off, velocities along their own gradient would be
 /// driven, not resisted, where r < 1/2.
 template <class Velocity>
-KOKKOS_INLINE_FUNCTION Vec3 excess_flux(const VaryingViscosity& v, double r, const Velocity& u, const IndexSpace& index, int d, int c) {
+KOKKOS_INLINE_FUNCTION Vec3 excess_flux(const VaryingViscosity& v, double r, const Velocity& u, const Array<NodeKind>& kind,
+                                        const IndexSpace& index, int d, int c) {
   const FaceDifferences face(v.x, index, d, c);
   const Vec3 area = load(v.face_area[d], c);
   Vec3 du[3], flux;
   for (int e = 0; e < 3; ++e) {
-    du[e] = face.of([&](int at) { return to_double(load(u, at)); }, index, e);
+    du[e] = face.of([&](int at) { return to_double(load(u, at)); }, kind, index, e);
     flux += ((r - 1) * dot(area, face.dual.b[e])) * du[e] + ((r - v.least) * dot(area, du[e])) * face.dual.b[e];
   }
   constexpr double round_off = 1e-12;
@@ -122,6 +138,24 @@ KOKKOS_FORCEINLINE_FUNCTION double face_viscosity(const VaryingViscosity& v, con
 /// Whether that viscosity on a face adds anything to the uniform one's flux.
 KOKKOS_FORCEINLINE_FUNCTION bool exceeds(const VaryingViscosity& v, double on_face) { return on_face != 1 || v.least != 1; }
 
+/// Whether a cell beside a body, and the fluid around it, have the uniform viscosity. All that its faces add up to there is the uniform
+/// part of the transpose, which vanishes with the divergence; what next to a surface is no flow of the grid's has one, and would drive
+/// the flow past a body by a share that depends on cells anywhere.
+KOKKOS_INLINE_FUNCTION bool uniform_beside_body(const VaryingViscosity& v, const Array<NodeKind>& kind, const IndexSpace& index, int c) {
+  bool beside = false;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x) {
+        const NodeKind here = kind(c + x * index.stride(0) + y * index.stride(1) + z * index.stride(2));
+        beside = beside || here == NodeKind::immersed || here == NodeKind::inside;
+      }
+  if (!beside) return false;
+  for (int d = 0; d < 3; ++d)
+    for (const int s : {-index.stride(d), index.stride(d)})
+      if (face_viscosity(v, kind, c, c + s) != 1) return false;
+  return true;
+}
+
 /// excess_flux() of u on the faces of owned cells, into v.excess: once for the two cells of each.
 template <class Velocity>
 void find_excess(const UniformViscosity&, const Velocity&, const Array<NodeKind>&, const IndexSpace&) {}
@@ -138,7 +172,7 @@ void find_excess(const VaryingViscosity& viscosity, const Velocity& velocity, co
     for_box("corpuscle::fluid::excess_flux", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
       const int c = index.cell(i, j, k), low = c - index.stride(d);
       const double r = kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c);
-      if (exceeds(v, r)) store(excess, c, excess_flux(v, r, u, index, d, c));
+      if (exceeds(v, r)) store(excess, c, excess_flux(v, r, u, kind, index, d, c));
     });
   }
 }
@@ -150,6 +184,7 @@ KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const UniformViscosity&, const 
 template <class Image>
 KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const VaryingViscosity& v, const Array<NodeKind>& kind, const IndexSpace& index, int c,
                                                  Image& image) {
+  if (v.least != 1 && uniform_beside_body(v, kind, index, c)) return;
   Vec3 force;
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {

@@ -1,6 +1,7 @@
 // Motion of massless membranes, which have the velocity of the fluid around them, with the volume held.
 #pragma once
 
+#include "common/extremes.hpp"
 #include "membrane/motion.hpp"
 
 namespace corpuscle {
@@ -44,21 +45,47 @@ inline void project_and_drift(const MembraneViews& m, const MotionViews& w, cons
       });
 }
 
-/// Take the volume back to V0, by at most the share `most` of it, which matters only where a cell starts away from V0. After
-/// measure_membranes() and measure_drift() at x.
+/// Take the volume back to V0, by at most the share `most` of it, which matters only where a cell starts away from V0, and keep in
+/// w.volume what it is then. After measure_membranes() and measure_drift() at x.
 inline void restore_volume(const MembraneViews& m, const MotionViews& w, double most) {
   const auto x = m.surface.x;
   for_sections(
       "corpuscle::membrane::restore_volume", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
-        const double rest = m.law(m.type(cell)).rest_volume, limit = most * rest;
-        const double wanted = rest - section_total(m.totals, cell, 1);
-        const double distance = (wanted > limit ? limit : (wanted < -limit ? -limit : wanted)) / section_total(w.sums, cell, 1);
+        const double rest = m.law(m.type(cell)).rest_volume, limit = most * rest, volume = section_total(m.totals, cell, 1);
+        const double wanted = rest - volume;
+        const double change = wanted > limit ? limit : (wanted < -limit ? -limit : wanted);
+        const double distance = change / section_total(w.sums, cell, 1);
+        if (section == 0)
+          Kokkos::single(Kokkos::PerTeam(team), [&]() { w.volume(cell) = change == wanted ? rest : volume + change; });
         Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
                              [&](int i) {
                                const Vec3 position = load(x, i) + distance * load(w.direction, i);
                                store(x, i, position);
                                if (!(dot(position, position) < 1e300)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
                              });
+      });
+}
+
+/// The largest share of its volume that a cell has lost or gained since restore_volume(). After measure_membranes() at x.
+inline double largest_volume_change(const MembraneViews& m, const MotionViews& w) {
+  double most = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::volume_change", Policy(0, m.cells),
+      KOKKOS_LAMBDA(int cell, double& sum) {
+        sum = larger(sum, std::fabs(section_total(m.totals, cell, 1) / w.volume(cell) - 1));
+      },
+      Largest(most));
+  return most;
+}
+
+/// The volumes as restore_volume() left them. After measure_membranes() and measure_drift() at x.
+inline void give_volume_back(const MembraneViews& m, const MotionViews& w) {
+  const auto x = m.surface.x;
+  for_sections(
+      "corpuscle::membrane::give_volume_back", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
+        const double distance = (w.volume(cell) - section_total(m.totals, cell, 1)) / section_total(w.sums, cell, 1);
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
+                             [&](int i) { store(x, i, load(x, i) + distance * load(w.direction, i)); });
       });
 }
 

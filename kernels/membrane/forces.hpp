@@ -49,8 +49,10 @@ void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Ce
         const CellLaw law = m.law(type);
         const Law in_plane = laws(type);
         const double cell_area = section_total(m.totals, cell, 0);
-        const GlobalLoads loads = global_loads(cell_area, section_total(m.totals, cell, 1), law);
-        if ((Law::holds_area || law.area > 0) && !(std::fabs(cell_area / law.rest_area - 1) <= m.most_area))
+        const double volume = section_total(m.totals, cell, 1);
+        const GlobalLoads loads = global_loads(cell_area, volume, law);
+        const bool too_large = (Law::holds_area || law.area > 0) && !(std::fabs(cell_area / law.rest_area - 1) <= m.most_area);
+        if (too_large || !(std::fabs(volume / law.rest_volume - 1) <= m.most_volume))
           Kokkos::single(Kokkos::PerTeam(team), [&]() { Kokkos::atomic_fetch_max(&m.status(0), cell + 1); });
         Kokkos::parallel_for(section_range(team, first, surface.first_triangle(cell + 1), section), [&](int t) {
           TriangleState state;

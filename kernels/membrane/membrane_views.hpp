@@ -12,6 +12,7 @@ namespace corpuscle {
 struct MembraneViews {
   int cells = 0, vertices = 0, triangles = 0;  // totals over all cells
   double most_area = 1e300;                    // share by which the area of a membrane that holds it may change
+  double most_volume = 1e300;                  // the same of the volume of any
   SurfaceSet surface;                          // shared with the fluid; the cells are its first bodies
 
   Array<int> type;                 // [cell]

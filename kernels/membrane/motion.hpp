@@ -38,6 +38,7 @@ struct RobinLoad {
 struct MotionViews {
   Components<double> direction;  // [vertex, 3] velocity per pressure: inverse of the left-hand side times dV/dx
   Table<double> sums;            // [cell * sections, 2] v . dV/dx um3/us, and direction . dV/dx
+  Array<double> volume;          // [cell] um3, at the end of a drift
 };
 
 /// (M/dt + beta A) v = M v/dt + F + F_fluid + beta A v_star at each vertex, and what the projection needs.

@@ -19,6 +19,7 @@ namespace {
 
 constexpr double far_away = 1e30;      // um
 constexpr double keep_share = 0.5;     // of a gap, in one step
+constexpr double enough_kept = 1e-3;   // of what is to be kept, that may be missing
 constexpr double followed_way = 1.0 / 3;  // of a cell's radius, in one step: lists of what is near take in all within several such ways
 constexpr double opening = 0.15;       // rate at which a film's gap follows its pressure, over gap and viscosity
 constexpr double followed = 0.5;       // of a gap's excess, that one step may undo
@@ -220,14 +221,14 @@ void Contact::find(const ContactViews& contacts) {
 
 /// Moves surfaces until no gap is below its goal. @returns what was short before
 Shortfall Contact::correct(double share, double least) {
-  constexpr double relax = 0.6, enough = 1e-3;
+  constexpr double relax = 0.6;
   const GapGoal goal{share, least, relax, movable_};
   Shortfall before;
   take_workspace(false);
   for (int pass = 0; pass < most_passes; ++pass) {
     const Shortfall now = shortfall(goal);
     if (pass == 0) before = now;
-    if (now.most <= enough) break;
+    if (now.most <= enough_kept) break;
     push(now_, surface_.x);
     if (peers_) peers_->update_copies();
   }
@@ -243,10 +244,13 @@ void Contact::push(const ContactViews& contacts, const Components<double>& sum) 
 
 void Contact::limit_ahead() { correct(keep_share, 0); }
 
-void Contact::limit_approach(double time) {
+bool Contact::limit_approach(double time) {
+  if (!crossed_) recurring_ = std::max(0, recurring_ - 1);
+  crossed_ = false;
   const Shortfall before = correct(keep_share, 0);
   report_.limited += before.limited;
   if (before.through > 0) count_crossings(before.through, before.first, time);
+  return before.most > enough_kept;
 }
 
 /// Of all ranks together, but for the contact that is named.

@@ -57,7 +57,9 @@ class Contact {
   void look_at_start(double dt);
   /// After a move: no gap has lost more than half of what it was when look() saw it. What went through is counted and
   /// told.
-  void limit_approach(double time_us);
+  /// @returns whether anything was moved, on any rank
+  /// @throws ComputationError  if it goes on from step to step
+  bool limit_approach(double time_us);
   /// The same for positions that are only looked ahead to.
   void limit_ahead();
 
@@ -129,6 +131,8 @@ class Contact {
   std::optional<ContactPeers> peers_;
   std::shared_ptr<Workspace> workspace_;
   ContactReport report_;
+  int recurring_ = 0;      // steps with crossings, less those without since
+  bool crossed_ = false;   // since the last limit_approach()
 };
 
 }  // namespace corpuscle

@@ -14,7 +14,8 @@ namespace corpuscle {
 
 namespace {
 
-constexpr long told = 5;  // crossings that are told one by one
+constexpr long told = 5;           // crossings that are told one by one
+constexpr int most_recurring = 10;  // steps with crossings, less those without: what is put back goes through again
 
 template <class View>
 auto host_of(const View& view) {
@@ -94,7 +95,17 @@ double Contact::fastest_crossing(double dt) const {
   return peers_ ? peers_->comm.max(most) : most;
 }
 
+/// @throws ComputationError  for crossings that go on from step to step
 void Contact::count_crossings(int vertices, int first, double time) {
+  if (!crossed_) ++recurring_;
+  crossed_ = true;
+  if (recurring_ >= most_recurring)
+    throw ComputationError(
+        fmt::format("surfaces cross: {} at {:.6g} us, {} vertices, and some have done so in {} steps: they are put back, and go through "
+                    "again. Likely cause: a flow or a load that presses them together harder than contact can hold, or a step too long: "
+                    "reduce the flow (the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), the load (push_nN) or time.step_us, "
+                    "raise contact.pressure_Pa, refine grid.nodes, or use more vertices (cells.vertices)",
+                    told_text(first), time, vertices, recurring_));
   if (report_.crossings < told)
     warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
   report_.crossings += vertices;

@@ -172,9 +172,9 @@ void CellLoads::look(double time, double dt) {
   if (contact_) contact_->look(time, dt);
 }
 
-void CellLoads::limit_approach(double time) {
+bool CellLoads::limit_approach(double time) {
   follow_bodies();
-  if (contact_) contact_->limit_approach(time);
+  return contact_ && contact_->limit_approach(time);
 }
 
 void CellLoads::limit_ahead() {

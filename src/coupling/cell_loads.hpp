@@ -43,7 +43,8 @@ class CellLoads {
   /// After a move of cells that were placed before it.
   void note_wall_gap();
   /// After a move: gaps must not close.
-  void limit_approach(double time_us);
+  /// @returns whether anything was moved, on any rank
+  bool limit_approach(double time_us);
   /// The same for positions that are only looked ahead to.
   void limit_ahead();
 

@@ -42,7 +42,9 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   check_pressure_gradient(*grid_, scene.fluid->pressure_gradient_Pa_per_um);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (scene.has_cells() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_, packed);
-  if (membranes()) membranes()->limit_area(Membranes::senseless_area);
+  if (!membranes()) return;
+  membranes()->limit_area(Membranes::senseless_area);
+  membranes()->limit_volume(Membranes::senseless_volume);
 }
 
 void FlowSimulation::step() {

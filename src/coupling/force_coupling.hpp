@@ -97,6 +97,7 @@ class ForceCoupling : public Coupling {
   SlipViews slip_of_membranes() const;
   void begin_step(double time_us, double dt_us, double ahead_us);
   void update_copies();
+  void hold_volume();
   void after_move(double time_us, double dt_us);
   void look(double time_us, double dt_us);
   void limit_slip(double dt_us);

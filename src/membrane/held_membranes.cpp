@@ -108,6 +108,7 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(views_.totals, "totals_section", std::size_t(views_.cells) * sections, 2);
   grow(views_.force, "force_vertex", needed.vertices, 3);
   grow(motion_.sums, "motion_sums_section", std::size_t(views_.cells) * sections, 2);
+  grow(motion_.volume, "motion_volume_cell", std::size_t(views_.cells));
   grow(start_x_, "start_x_vertex", views_.vertices, 3);
 }
 

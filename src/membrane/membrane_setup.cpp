@@ -113,6 +113,7 @@ MotionViews make_motion_views(const MembraneViews& m) {
   MotionViews w;
   w.direction = Components<double>("corpuscle::membrane::direction_vertex", m.vertices, 3);
   w.sums = Table<double>(label("motion_sums_section"), m.cells * sections, 2);
+  w.volume = Array<double>(label("motion_volume_cell"), m.cells);
   return w;
 }
 

@@ -233,6 +233,26 @@ void Membranes::drift(double dt) {
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
+double Membranes::volume_taken() {
+  if (views_.cells == 0) return 0;
+  measure_membranes(views_, views_.surface.x);
+  return largest_volume_change(views_, motion_);
+}
+
+void Membranes::give_volume_back() {
+  if (views_.cells == 0) return;
+  take_workspace();
+  measure_drift(views_, motion_);
+  corpuscle::give_volume_back(views_, motion_);
+}
+
+void Membranes::limit_volume(double share) {
+  constexpr double farther = 1.1;  // than at the start
+  views_.most_volume = share;
+  for (const CellReference& type : types_)
+    views_.most_volume = std::max(views_.most_volume, farther * std::abs(volume(type.mesh) / type.law.rest_volume - 1));
+}
+
 std::vector<int> Membranes::first_of_types() const {
   const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
   std::vector<int> first(types_.size(), no_cell);
@@ -309,12 +329,23 @@ void Membranes::explain_area(int cell, double drift) const {
       name(cell), 100 * drift, 100 * lysis_area));
 }
 
+void Membranes::explain_volume(int cell, double drift) const {
+  throw ComputationError(fmt::format(
+      "membrane: the volume of {} is off by {:.1f} %, and nothing goes through a membrane. Likely cause: it is pressed against others, a "
+      "wall or a rigid body harder than contact can hold, which takes room that it has nowhere else, or the step is too long: reduce "
+      "time.step_us, the flow (the boundaries' velocities, fluid.pressure_gradient_Pa_per_um) or the push (push_nN), or refine "
+      "grid.nodes",
+      name(cell), 100 * drift));
+}
+
 void Membranes::explain(int cell, double dt) {
   const CellDiagnostics now = diagnostics()[cell];
   const bool finite = std::isfinite(now.area_um2) && std::isfinite(now.volume_um3) && std::isfinite(now.stretch);
   const double drift = std::abs(now.area_um2 / now.rest_area_um2 - 1);
   if (dt > 0) copy_motion(views_.vertices, start_x_, start_v_, views_.surface.x, views_.surface.v);
   if (finite && now.stretch < strain_limit(law_[cell]) && drift > views_.most_area) explain_area(cell, drift);
+  const double lost = now.volume_um3 / now.rest_volume_um3 - 1;
+  if (finite && now.stretch < strain_limit(law_[cell]) && std::abs(lost) > views_.most_volume) explain_volume(cell, lost);
   const CellDiagnostics before = diagnostics()[cell];
   const std::string reached = stretch_text(law_[cell], now.stretch);
   const std::string was = dt > 0 ? fmt::format(" ({} before)", stretch_text(law_[cell], before.stretch)) : "";

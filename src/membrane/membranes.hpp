@@ -114,6 +114,9 @@ class Membranes {
   static constexpr double lysis_area = 0.04, senseless_area = 0.1;
   /// From now on a cell whose area should be held and changes by more than `share` stops a step as an overstretched one does.
   void limit_area(double share) { views_.most_area = share; }
+  static constexpr double senseless_volume = 0.05;
+  /// The same of a cell whose volume is off V0 by more than `share`, and by more than shapes are that start away from it.
+  void limit_volume(double share);
 
   /// [vertex] how many times as fast as at rest the membrane answers tangential forces per area there, about and at most.
   /// After compute_forces().
@@ -150,6 +153,10 @@ class Membranes {
   /// Volumes are V0 then. After compute_forces() at the present positions.
   /// @throws ComputationError  if a position is not finite
   void drift(double dt_us);
+  /// The largest share of its volume that a cell has lost or gained since drift(), to what has moved vertices besides, and the way back,
+  /// all over its surface.
+  double volume_taken();
+  void give_volume_back();
 
   /// [type] the number of its first cell here; no_cell without one.
   std::vector<int> first_of_types() const;
@@ -204,6 +211,7 @@ class Membranes {
   double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta);
   [[noreturn]] void explain(int cell, double dt);
   [[noreturn]] void explain_area(int cell, double drift) const;
+  [[noreturn]] void explain_volume(int cell, double drift) const;
 
   MembraneViews views_;
   std::unique_ptr<Elasticity> elasticity_;

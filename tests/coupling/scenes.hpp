@@ -3,6 +3,7 @@
 
 #include "cells/shared_cells.hpp"
 #include "coupling/flow_simulation.hpp"
+#include "coupling/restart.hpp"
 
 #include <unistd.h>
 
@@ -111,6 +112,21 @@ class SharedFile {
  private:
   std::filesystem::path path_;
 };
+
+#ifdef CORPUSCLE_HDF5
+/// Takes both to their end, the second from a checkpoint of the first after so many steps. Every rank that has one calls.
+inline void go_on_from_checkpoint(const SharedFile& file, FlowSimulation& whole, FlowSimulation& after, long steps) {
+  CheckpointTexts texts;
+  texts.resolved = "title = \"a\"\n", texts.totals = "{}";
+  while (!whole.done()) {
+    whole.step();
+    if (whole.steps() != steps) continue;
+    write_checkpoint(file.path(), whole, texts);
+    read_checkpoint(file.path(), after, texts.resolved, "");
+  }
+  while (!after.done()) after.step();
+}
+#endif
 
 /// Calls work(comm) on the first ranks, among themselves. Every rank calls.
 template <class Work>

@@ -5,7 +5,6 @@
 
 #include "core/error.hpp"
 #include "coupling/energy_balance.hpp"
-#include "coupling/restart.hpp"
 #include "scenes.hpp"
 
 using namespace corpuscle;
@@ -243,15 +242,7 @@ TEST_CASE("pressed cells go on from a checkpoint with the same bits", "[coupling
   const Case scene = pressed_cells(0.15, 0.5, 20, 600);
   Timers timers;
   FlowSimulation whole(Comm(), scene, timers), after(Comm(), scene, timers);
-  CheckpointTexts texts;
-  texts.resolved = "title = \"a\"\n", texts.totals = "{}";
-  while (!whole.done()) {
-    whole.step();
-    if (whole.steps() != 18) continue;
-    write_checkpoint(file.path(), whole, texts);
-    read_checkpoint(file.path(), after, texts.resolved, "");
-  }
-  while (!after.done()) after.step();
+  go_on_from_checkpoint(file, whole, after, 18);
   CHECK(whole.coupling()->contact_report()->smallest_gap < 0.25);
   CHECK(positions(whole) == positions(after));
 }

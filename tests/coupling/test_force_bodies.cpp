@@ -3,10 +3,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "balls.hpp"
 #include "core/error.hpp"
 #include "coupling/energy_balance.hpp"
-#include "coupling/restart.hpp"
-#include "scenes.hpp"
 #include "transfer/transfer.hpp"
 
 using namespace corpuscle;
@@ -15,53 +14,6 @@ using namespace corpuscle::scenes;
 namespace {
 
 using Type = BoundarySettings::Type;
-
-CellSettings capsule(double radius, const Triple& centre, double modulus = 5) {
-  CellSettings cell;
-  cell.shape = CellSettings::Shape::sphere;
-  cell.radius_um = radius;
-  cell.vertices = 162;
-  cell.law = CellSettings::Law::neo_hookean;
-  cell.area_modulus_uN_per_m = cell.local_area_modulus_uN_per_m = 0;
-  cell.shear_modulus_uN_per_m = modulus;
-  cell.center_um = centre;
-  return cell;
-}
-
-BodySettings ball(double radius, const Triple& centre) {
-  BodySettings body;
-  body.radius_um = radius;
-  body.center_um = centre;
-  return body;
-}
-
-/// A ball in the middle of a box that is periodic all round, a gradient along x past it, and a capsule beside it; spacing 0.75 um.
-Case past_a_ball(double end_us) {
-  Case scene;
-  scene.time = {10, end_us};
-  scene.grid = cube(12, 16);
-  scene.fluid = FluidSettings{};
-  scene.fluid->convection = FluidSettings::Convection::none;
-  scene.fluid->momentum_tolerance = scene.fluid->divergence_tolerance = 1e-11;
-  scene.fluid->pressure_gradient_Pa_per_um = {-0.2, 0, 0};
-  scene.boundaries = sides(Type::periodic);
-  scene.bodies = {ball(2.5, {0.11, -0.07, 0.05})};
-  scene.cells = {capsule(1.5, {-0.4, 4.6, 0.3})};
-  scene.coupling = CouplingSettings{};
-  scene.coupling->scheme = CouplingSettings::Scheme::force;
-  scene.contact = ContactSettings{};
-  return scene;
-}
-
-/// The same with the capsule ahead of the ball, pushed onto it.
-Case pushed_onto_a_ball(double push_nN, double end_us) {
-  Case scene = past_a_ball(end_us);
-  scene.time.step_us = 20;
-  scene.fluid->pressure_gradient_Pa_per_um = {0, 0, 0};
-  scene.cells = {capsule(1.5, {-4, -0.07, 0.05})};
-  scene.cells[0].push_nN = {push_nN, 0, 0};
-  return scene;
-}
 
 double largest_speed(FlowSimulation& simulation) {
   const auto v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), simulation.shared_cells()->surfaces().v);
@@ -176,23 +128,6 @@ TEST_CASE("cells that begin in a body, or around one, are refused", "[coupling][
   CHECK(refused({-4.3, 0, 0}, 2.5, {0, 0, 0}) == "accepted");
 }
 
-namespace {
-
-/// Balls that move through a box that is periodic all round, one past a capsule and through a side; one presses a capsule against a ball
-/// that is held beyond a side.
-Case balls_among_capsules(double end_us) {
-  Case scene = past_a_ball(end_us);
-  scene.time.step_us = 20;
-  scene.bodies = {ball(1.9, {-3.4, 0.2, -3.1}), ball(1.9, {3.2, -0.3, 2.9}), ball(1.9, {3.0, -5.6, 3.1})};
-  scene.bodies[0].velocity_um_per_us = {-2e-3, 0, 0};
-  scene.bodies[1].velocity_um_per_us = {0, 1.5e-3, 0.2e-3};
-  scene.bodies[1].angular_velocity_rad_per_us = {0, 0, 5e-4};
-  scene.cells = {capsule(1.2, {-0.2, -3.2, 0.3}, 4), capsule(1.2, {3.2, 3.1, 3.0}, 4), capsule(1.2, {-4.9, 3.4, -3.0}, 4)};
-  return scene;
-}
-
-}  // namespace
-
 TEST_CASE("bodies that move push cells on, through periodic sides, and the energy closes", "[coupling][force][bodies][contact]") {
   Timers timers;
   const Case scene = balls_among_capsules(500);
@@ -236,18 +171,9 @@ TEST_CASE("bodies that move push cells on, through periodic sides, and the energ
 #ifdef CORPUSCLE_HDF5
 TEST_CASE("cells among moving bodies go on from a checkpoint with the same bits", "[coupling][force][bodies][restart]") {
   const SharedFile file("bodies");
-  const Case scene = balls_among_capsules(300);
   Timers timers;
-  FlowSimulation whole(Comm(), scene, timers), after(Comm(), scene, timers);
-  CheckpointTexts texts;
-  texts.resolved = "title = \"a\"\n", texts.totals = "{}";
-  while (!whole.done()) {
-    whole.step();
-    if (whole.steps() != 8) continue;
-    write_checkpoint(file.path(), whole, texts);
-    read_checkpoint(file.path(), after, texts.resolved, "");
-  }
-  while (!after.done()) after.step();
+  FlowSimulation whole(Comm(), balls_among_capsules(300), timers), after(Comm(), balls_among_capsules(300), timers);
+  go_on_from_checkpoint(file, whole, after, 8);
   CHECK(whole.coupling()->contact_report()->smallest_body_gap < 0.25);
   CHECK(positions(whole) == positions(after));
 }
