@@ -11,7 +11,16 @@ struct MobilityModel {
   double viscosity = 1;  // mPa s
   double radius = 1;     // um, of a blob
   double slip = 0;       // um
+  double dipole = 0, width = 1;  // um: how far the dipoles of forces take the membrane along, and what they are smeared over
 };
+
+/// Of forces along a surface whose dipoles are spread, and act back, as well: the velocities on both sides of it differ by their strength
+/// over the viscosity, and what shears between moves the membrane.
+KOKKOS_INLINE_FUNCTION Vec3 dipole_velocity(const MobilityModel& model, const Vec3& r, const Vec3& f, const Vec3& normal) {
+  const double pi = 3.14159265358979323846, square = model.width * model.width;
+  const double share = std::exp(-0.5 * dot(r, r) / square) / (2 * pi * square);
+  return (model.dipole / model.viscosity * share) * (f - dot(f, normal) * normal);
+}
 
 KOKKOS_INLINE_FUNCTION Vec3 blob_velocity(const MobilityModel& model, const Vec3& r, const Vec3& f) {
   const double pi = 3.14159265358979323846, a = model.radius, distance = norm(r);
@@ -35,7 +44,11 @@ inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility
       "corpuscle::membrane::mobility", Policy(first, last), KOKKOS_LAMBDA(int i) {
         const Vec3 at = load(x, i), f = load(w.mode, i), n = load(normal, i);
         Vec3 v = (model.slip / (model.viscosity * area(i))) * (f - dot(f, n) * n);
-        for (int j = first; j < last; ++j) v += blob_velocity(model, at - load(x, j), load(w.mode, j));
+        for (int j = first; j < last; ++j) {
+          const Vec3 r = at - load(x, j), of_j = load(w.mode, j);
+          v += blob_velocity(model, r, of_j);
+          if (model.dipole > 0) v += dipole_velocity(model, r, of_j, n);
+        }
         store(w.probe, i, v);
       });
   double total = 0;

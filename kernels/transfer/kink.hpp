@@ -51,7 +51,7 @@ KOKKOS_INLINE_FUNCTION MarkerKink marker_kink(const TransferBlock& block, const 
   Vec3 along[3];
   tangents_at(block, eta, along);
   const double spacing = spacing_along(along, kink.normal);
-  kink.way = -2 * (ratio - 1) / (ratio + 1) * slip.law.kink * share * spacing;
+  kink.way = kink_between(slip.law, ratio) * share * spacing;
   if (slip.gap.extent(0) > 0) kink.way *= slip_share(slip.gap(v) / spacing);
   const DualBasis dual(along[0], along[1], along[2]);
   for (int e = 0; e < 3; ++e) kink.dual[e] = dual.b[e];

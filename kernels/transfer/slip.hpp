@@ -28,6 +28,9 @@ KOKKOS_INLINE_FUNCTION double slip_between(const SlipLaw& law, double ratio) {
   return left > 0 ? 2 * left / (1 + ratio) : 0;
 }
 
+/// What the velocity of a membrane between two fluids takes along of the mean shear there, over spacings; see kink.hpp.
+KOKKOS_INLINE_FUNCTION double kink_between(const SlipLaw& law, double ratio) { return -2 * (ratio - 1) / (ratio + 1) * law.kink; }
+
 /// The spacing along a normal.
 KOKKOS_INLINE_FUNCTION double spacing_along(const Vec3 (&along)[3], const Vec3& normal) {
   double square = 0;

@@ -196,7 +196,11 @@ void SharedCells::restore(const std::vector<CellRecord>& cells, const std::vecto
 void SharedCells::settle(const std::vector<int>& owners) {
   distribute(owners);
   measure(0);
-  renew_copies();
+  try {
+    renew_copies();
+  } catch (const ComputationError& error) {  // before a step it is the input that is wrong
+    throw InputError(error.what());
+  }
 }
 
 /// Holds own_, which carry this, without copies.
@@ -286,8 +290,8 @@ std::string SharedCells::unseen_images(const SpaceBox& around, int cell) const {
     }
     if (next - std::abs(apart) <= half)
       return fmt::format("{} reaches over too many periods of the grid along {}, of {:.3g} um: it meets more than {} images of itself "
-                         "each way. Likely cause: a step too long for the flow, or a grid too short: reduce time.step_us or lengthen "
-                         "the grid",
+                         "each way. Likely cause: a grid too short for the cell, or, in a run, a step too long for the flow: lengthen the "
+                         "grid (grid.upper_um, grid.length_um), or reduce time.step_us",
                          body_name(surfaces(), cell), "ijk"[d], norm(frame_.period[d]), most_turns);
   }
   return "";

@@ -39,6 +39,13 @@ double mean_spacing(const Grid& grid, int d) {
   return grid.total_volume() / grid.comm().sum(swept);
 }
 
+/// The least and the greatest of the mean spacings along the grid's directions.
+std::pair<double, double> spacings(const Grid& grid) {
+  const double along[3] = {mean_spacing(grid, 0), mean_spacing(grid, 1), mean_spacing(grid, 2)};
+  const auto [least, most] = std::minmax_element(along, along + 3);
+  return {*least, *most};
+}
+
 /// Within which cells act on each other, um.
 double contact_reach(const Case& scene) {
   if (!scene.contact) return 0;
@@ -269,11 +276,9 @@ double ForceCoupling::resisting_share() const {
   return share;
 }
 
-/// Membranes that resist their own short waves alone would wait for the fluid's answer, 1 / (beta m) steps where a wave's mobility is
-/// m. With the kink of the velocity between two fluids mobilities are larger than the model's: 0.4 in place of 0.15 was still stable
-/// at a ratio of five, 0.5 not, and carrying on in time takes a third of it.
+/// Where beta alone stands for the fluid's answer, short waves wait for it, 1 / (beta m) steps where a wave's mobility is m.
 void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers) {
-  constexpr double share = 0.15;
+  constexpr double share = 0.5;  // unstable above 4/3
   const double resistance = fluid_.grid().comm().max(membranes_->largest_resistance(model, numbers));
   short_waves_ = resistance > 0 ? share / resistance : 0;
   membranes_->take_share_of_resistance(short_waves_);
@@ -282,15 +287,20 @@ void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
 /// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
-/// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that.
+/// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
+/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two.
 void ForceCoupling::measure_stability() {
-  constexpr double limit = 1.5;
-  const double spacing = fluid_.grid().mean_spacing();
+  constexpr double limit = 1.5, of_dipoles = 2;
+  const auto [narrowest, widest] = spacings(fluid_.grid());
   update_surface_geometry(surfaces());
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
-  model.radius = transfer_->marker_radius() * spacing;
-  model.slip = scene_.coupling->slip ? slip_of_membranes().law.coefficient * transfer_->largest_slip() * spacing : 0;
+  model.radius = transfer_->marker_radius() * narrowest;
+  if (scene_.coupling->slip) {
+    model.slip = slip_of_membranes().law.coefficient * transfer_->largest_slip() * widest;
+    model.dipole = of_dipoles * transfer_->largest_dipole() * resisting_share() * widest;
+    model.width = 0.8 * narrowest;
+  }
   // Of each type the same cell on any number of ranks: what slip is held to goes by this.
   std::vector<int> numbers = membranes_->first_of_types();
   for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));

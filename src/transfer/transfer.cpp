@@ -322,6 +322,15 @@ double Transfer::largest_slip() const {
   return most;
 }
 
+double Transfer::largest_dipole() const {
+  double most = 0;
+  for (double ratio : ratios_) {
+    const double kink = kink_between(law_of_slip(), ratio);
+    most = std::max(most, 0.5 * (1 + 1 / ratio) * kink * kink);
+  }
+  return most;
+}
+
 double Transfer::marker_radius() const {
   double radius = 0;
   with_kernel([&](auto delta) { radius = decltype(delta)::radius; });

@@ -57,6 +57,9 @@ class Transfer {
                  const Array<double>& gap = {}, const Components<double>& followed = {}) const;
   /// Of the slip in one fluid, the largest share that those of slip_between() leave.
   double largest_slip() const;
+  /// How far dipoles that take off kinks move a membrane, times the viscosity outside over the force per area and the spacing: the square
+  /// of what velocity and force each take along of a shear, which both fluids resist half.
+  double largest_dipole() const;
 
   /// Vertices that lie in this rank's own cells, after place(). Over all ranks and copies every vertex does once.
   int at_home() const;
