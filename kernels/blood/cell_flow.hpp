@@ -55,7 +55,7 @@ KOKKOS_INLINE_FUNCTION void add_cell_flow(const FlowFrame& frame, int bins, cons
 inline void sum_cell_flow(const SurfaceSet& set, int cells, const FlowFrame& frame, int bins,
                           const Table<double>& parts, const Array<double>& totals) {
   const auto x = set.x, v = set.v;
-  const auto triangle = set.triangle;
+  const SurfaceSet s = set;
   const auto first_triangle = set.first_triangle, first_vertex = set.first_vertex;
   const int columns = CellFlowColumn::within + bins;
   for_sections(
@@ -66,7 +66,7 @@ inline void sum_cell_flow(const SurfaceSet& set, int cells, const FlowFrame& fra
             section_range(team, first_triangle(cell), first_triangle(cell + 1), section),
             [&](int t, CellFlowSums& sum) {
               Vec3 corner[3], velocity[3];
-              for (int k = 0; k < 3; ++k) corner[k] = load(x, triangle(t, k)), velocity[k] = load(v, triangle(t, k));
+              for (int k = 0; k < 3; ++k) corner[k] = load(x, s.triangle(t, k)), velocity[k] = load(v, s.triangle(t, k));
               add_cell_flow(frame, bins, corner, velocity, origin, sum);
             },
             total);

@@ -91,7 +91,7 @@ inline void measure_shapes(const SurfaceSet& set, int cells, const Array<int>& t
                            const FlowFrame& frame, const Table<double>& table) {
   using Column = ShapeColumn;
   const auto x = set.x, reference = material.place;
-  const auto triangle = set.triangle;
+  const SurfaceSet s = set;
   const auto first_vertex = set.first_vertex, first_triangle = set.first_triangle, first_of_type = material.first;
   Kokkos::parallel_for(
       "corpuscle::blood::measure_shapes", Kokkos::TeamPolicy<Exec>(cells, Kokkos::AUTO),
@@ -103,7 +103,7 @@ inline void measure_shapes(const SurfaceSet& set, int cells, const Array<int>& t
             Kokkos::TeamThreadRange(team, first_triangle(cell), first_triangle(cell + 1)),
             [&](int t, Sums<10>& sum) {
               Vec3 corner[3];
-              for (int k = 0; k < 3; ++k) corner[k] = load(x, triangle(t, k)) - origin;
+              for (int k = 0; k < 3; ++k) corner[k] = load(x, s.triangle(t, k)) - origin;
               sum += tetrahedron_moments(corner);
             },
             moments);

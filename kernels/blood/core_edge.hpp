@@ -38,14 +38,14 @@ inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame
                            const Table<double>& edge) {
   Kokkos::deep_copy(Exec(), edge, nobody);
   const auto x = set.x;
-  const auto triangle = set.triangle;
+  const SurfaceSet s = set;
   const FlowFrame f = frame;
   Kokkos::parallel_for(
       "corpuscle::blood::core_edge", Policy(0, triangles), KOKKOS_LAMBDA(int t) {
         Vec3 corner[3];
         double along[3];
         for (int k = 0; k < 3; ++k) {
-          corner[k] = load(x, triangle(t, k));
+          corner[k] = load(x, s.triangle(t, k));
           const FlowPlace place = locate_in_flow(f, corner[k]);
           along[k] = windows_along(f, corner[k], place, windows);
           reach_out(f, place, window_number(f, along[k], windows), along[k] - std::floor(along[k]), edge);

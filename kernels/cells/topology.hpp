@@ -1,51 +1,55 @@
-// The connectivity of the cells that a rank holds, from one template for each type.
+// Where the cells that a rank holds have their connectivity: in the tables of their types.
 #pragma once
 
-#include "common/vec3.hpp"
+#include <utility>
+
 #include "immersed/surface_views.hpp"
 
 namespace corpuscle {
 
-/// Fills the numbering of vertices and triangles of the bodies first <= body < last of `set`, whose first_vertex and first_triangle are
-/// given. @param types  its bodies are the types
-/// @param type   [body] of set
-inline void fill_topology(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last) {
+/// Says of the bodies first <= body < last of `set`, whose first_vertex and first_triangle are given, which they are and where what is
+/// alike has its places.
+/// @param types   in whose tables, its bodies being the types, the places are
+/// @param type    [body] of set
+/// @param behind  so many vertices and triangles stand before those in the tables of set
+inline void place_bodies(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last,
+                         std::pair<int, int> behind = {0, 0}) {
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const SurfaceSet from = types, to = set;
+  const int before_vertices = behind.first, before_triangles = behind.second;
   Kokkos::parallel_for(
-      "corpuscle::cells::fill_topology", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
+      "corpuscle::cells::place_bodies", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
         const int body = first + team.league_rank(), v0 = to.first_vertex(body), t0 = to.first_triangle(body);
-        const int from_v0 = from.first_vertex(type(body)), from_t0 = from.first_triangle(type(body));
         const int vertices = to.first_vertex(body + 1) - v0, triangles = to.first_triangle(body + 1) - t0;
-        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, vertices), [&](int i) {
-          to.vertex_body(v0 + i) = body;
-          to.ring_start(v0 + i) = from.ring_start(from_v0 + i) + 3 * (t0 - from_t0);
-        });
-        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, triangles), [&](int t) {
-          to.triangle_body(t0 + t) = body;
-          for (int k = 0; k < 3; ++k) {
-            to.triangle(t0 + t, k) = from.triangle(from_t0 + t, k) + v0 - from_v0;
-            to.neighbour(t0 + t, k) = from.neighbour(from_t0 + t, k) + t0 - from_t0;
-            to.ring_triangle(3 * (t0 + t) + k) = from.ring_triangle(3 * (from_t0 + t) + k) + t0 - from_t0;
-            to.ring_corner(3 * (t0 + t) + k) = from.ring_corner(3 * (from_t0 + t) + k);
-          }
-        });
+        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, vertices), [&](int i) { to.vertex_body(v0 + i) = body; });
+        Kokkos::parallel_for(Kokkos::TeamThreadRange(team, triangles), [&](int t) { to.triangle_body(t0 + t) = body; });
         Kokkos::single(Kokkos::PerTeam(team), [&]() {
-          if (body + 1 == to.bodies) to.ring_start(v0 + vertices) = 3 * (t0 + triangles);
+          to.to_place(body, 0) = before_vertices + from.first_vertex(type(body)) - v0;
+          to.to_place(body, 1) = before_triangles + from.first_triangle(type(body)) - t0;
+          if (body + 1 < to.bodies) return;
+          // Behind the last, whose place is the first of all, where rings start at zero.
+          to.vertex_body(v0 + vertices) = body + 1;
+          to.to_place(body + 1, 0) = -(v0 + vertices);
+          to.to_place(body + 1, 1) = -(t0 + triangles);
         });
       });
 }
 
-/// For the bodies of the vertices first <= i < last of `set`: shift [body] from their numbers to those of their templates, which begin at
-/// `offset`, and the area [vertex] that they have there.
-inline void fill_rest(const SurfaceSet& types, const Array<int>& type, const SurfaceSet& set, int first, int last, int offset,
-                      const Array<int>& shift, const Array<double>& area) {
-  const SurfaceSet from = types, to = set;
+/// Copies the tables of `from`, whose numbers are its places, into those of `to`, behind so many vertices and triangles.
+inline void append_tables(const SurfaceSet& of, int before_vertices, int before_triangles, const SurfaceSet& into) {
+  const SurfaceSet from = of, to = into;
   Kokkos::parallel_for(
-      "corpuscle::cells::fill_rest", Policy(first, last), KOKKOS_LAMBDA(int i) {
-        const int body = to.vertex_body(i), by = from.first_vertex(type(body)) - to.first_vertex(body);
-        if (i == to.first_vertex(body)) shift(body) = by + offset;
-        area(i) = from.area(i + by);
+      "corpuscle::cells::append_triangles", Policy(0, from.triangles), KOKKOS_LAMBDA(int t) {
+        for (int k = 0; k < 3; ++k) {
+          to.place_triangle(before_triangles + t, k) = before_vertices + from.place_triangle(t, k);
+          to.place_neighbour(before_triangles + t, k) = before_triangles + from.place_neighbour(t, k);
+          to.place_ring_triangle(3 * (before_triangles + t) + k) = before_triangles + from.place_ring_triangle(3 * t + k);
+          to.place_ring_corner(3 * (before_triangles + t) + k) = from.place_ring_corner(3 * t + k);
+        }
+      });
+  Kokkos::parallel_for(
+      "corpuscle::cells::append_rings", Policy(0, from.vertices + 1), KOKKOS_LAMBDA(int i) {
+        to.place_ring_start(before_vertices + i) = 3 * before_triangles + from.place_ring_start(i);
       });
 }
 

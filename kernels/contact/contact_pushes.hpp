@@ -46,13 +46,14 @@ inline void contact_forces(const SurfaceSet& surface, const ContactLaw& contact_
                            const ContactLists& lists, const ContactViews& contacts, const Array<double>& push) {
   const SurfaceSet s = surface;
   const ContactLaw law = contact_law;
-  const auto area = at_rest.area, force = push;
+  const ContactRest rest = at_rest;
+  const auto force = push;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
   Kokkos::parallel_for(
       "corpuscle::contact::forces", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
         for (int g = first(v); g < first(v + 1); ++g)
-          force(g) = c.item(g) < 0 ? 0 : 0.5 * area(v) * law.total_pressure(c.gap(g), !same_body(s, v, c.item(g)));
+          force(g) = c.item(g) < 0 ? 0 : 0.5 * rest.area_of(s, v) * law.total_pressure(c.gap(g), !same_body(s, v, c.item(g)));
       });
 }
 
@@ -61,7 +62,7 @@ inline double contact_energy(const SurfaceSet& surface, const ContactLaw& contac
                              const ContactLists& lists, const ContactViews& contacts, int own) {
   const SurfaceSet s = surface;
   const ContactLaw law = contact_law;
-  const auto area = at_rest.area;
+  const ContactRest rest = at_rest;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
   double energy = 0;
@@ -69,7 +70,7 @@ inline double contact_energy(const SurfaceSet& surface, const ContactLaw& contac
       "corpuscle::contact::energy", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, double& sum) {
         for (int g = first(v); g < first(v + 1); ++g)
-          if (c.item(g) >= 0 && counts(s, v, c.item(g), own)) sum += 0.5 * area(v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
+          if (c.item(g) >= 0 && counts(s, v, c.item(g), own)) sum += 0.5 * rest.area_of(s, v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
       },
       energy);
   return energy;
@@ -86,7 +87,7 @@ inline Sums<4> contact_load_on_rigid(const SurfaceSet& surface, const ContactLaw
                                      const ContactLists& lists, const ContactViews& contacts, int own, int rigid_body) {
   const SurfaceSet s = surface;
   const ContactLaw law = contact_law;
-  const auto area = at_rest.area;
+  const ContactRest rest = at_rest;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
   const RigidNumber is{s, rigid_body};
@@ -99,7 +100,7 @@ inline Sums<4> contact_load_on_rigid(const SurfaceSet& surface, const ContactLaw
           const int t = item_triangle(s, c.item(g));
           const bool vertex = is(s.vertex_body(v));
           if (!vertex && !is(s.triangle_body(t))) continue;
-          const double push = (vertex ? 0.5 : -0.5) * area(v) * law.total_pressure(c.gap(g), true);
+          const double push = (vertex ? 0.5 : -0.5) * rest.area_of(s, v) * law.total_pressure(c.gap(g), true);
           Vec3 velocity = load(s.v, v);
           if (!vertex) {
             velocity = {};

@@ -7,11 +7,11 @@ namespace corpuscle {
 
 /// What contact knows of surfaces at rest.
 struct ContactRest {
-  Components<double> x;  // [place, 3] um; bodies alike may have theirs in the same places
-  Array<int> shift;      // [body] from its vertices' numbers to their places in x
-  Array<double> area;    // [vertex] um2: how much of its surface a vertex stands for
+  Components<double> x;  // [vertex place, 3] um
+  Array<double> area;    // [vertex place] um2: how much of its surface a vertex stands for
 
-  KOKKOS_INLINE_FUNCTION Vec3 at(const SurfaceSet& s, int v) const { return load(x, v + shift(s.vertex_body(v))); }
+  KOKKOS_INLINE_FUNCTION Vec3 at(const SurfaceSet& s, int v) const { return load(x, s.vertex_place(v)); }
+  KOKKOS_INLINE_FUNCTION double area_of(const SurfaceSet& s, int v) const { return area(s.vertex_place(v)); }
 };
 
 /// The triangles that are near each vertex, or may come near it before the lists are made anew. Items are triangles

@@ -3,6 +3,7 @@
 
 #include "common/extremes.hpp"
 #include "contact/contact_law.hpp"
+#include "contact/contact_views.hpp"
 #include "grid/wall_sides.hpp"
 #include "transfer/marker_views.hpp"
 
@@ -85,13 +86,13 @@ struct WallContacts {
   Lattice lattice;
   MarkerViews markers;
   WallSides walls;
-  Components<double> x;  // [vertex, 3] um
+  SurfaceSet surface;    // of the vertices
   double reach = 0;      // um
 
   /// Of a marker's vertex; far where no wall is within reach, or the marker is not at home.
   KOKKOS_INLINE_FUNCTION WallGap of(int marker) const {
     if (!markers.home(marker)) return {};
-    return nearest_wall(lattice, walls, MarkerPlace(lattice, markers, marker).eta, load(x, markers.vertex(marker)), reach);
+    return nearest_wall(lattice, walls, MarkerPlace(lattice, markers, marker).eta, load(surface.x, markers.vertex(marker)), reach);
   }
 };
 
@@ -105,32 +106,34 @@ inline double least_wall_gap(const WallContacts& contacts) {
   return least;
 }
 
-/// fJ, of the walls' repulsion. @param rest_area  [vertex] um2
-inline double wall_energy(const WallContacts& contacts, const ContactLaw& contact_law, const Array<double>& rest_area) {
+/// fJ, of the walls' repulsion.
+inline double wall_energy(const WallContacts& contacts, const ContactLaw& contact_law, const ContactRest& at_rest) {
   const WallContacts c = contacts;
   const ContactLaw law = contact_law;
+  const ContactRest rest = at_rest;
   double energy = 0;
   Kokkos::parallel_reduce(
       "corpuscle::contact::wall_energy", Policy(0, c.markers.count),
       KOKKOS_LAMBDA(int marker, double& sum) {
         const WallGap wall = c.of(marker);
-        if (wall.gap < law.range) sum += rest_area(c.markers.vertex(marker)) * law.repulsion_energy(wall.gap);
+        if (wall.gap < law.range) sum += rest.area_of(c.surface, c.markers.vertex(marker)) * law.repulsion_energy(wall.gap);
       },
       energy);
   return energy;
 }
 
-/// force [vertex, 3] = that of the walls on the vertices at home, nN; zero elsewhere. @param rest_area  [vertex] um2
-inline void wall_forces(const WallContacts& contacts, const ContactLaw& contact_law, const Array<double>& rest_area,
+/// force [vertex, 3] = that of the walls on the vertices at home, nN; zero elsewhere.
+inline void wall_forces(const WallContacts& contacts, const ContactLaw& contact_law, const ContactRest& at_rest,
                         const Components<double>& force) {
   const WallContacts c = contacts;
   const ContactLaw law = contact_law;
+  const ContactRest rest = at_rest;
   Kokkos::deep_copy(Exec(), force, 0.0);
   Kokkos::parallel_for(
       "corpuscle::contact::wall_forces", Policy(0, c.markers.count), KOKKOS_LAMBDA(int marker) {
         const WallGap wall = c.of(marker);
         const int v = c.markers.vertex(marker);
-        if (wall.gap < law.range) store(force, v, (rest_area(v) * law.repulsion(wall.gap)) * wall.inward);
+        if (wall.gap < law.range) store(force, v, (rest.area_of(c.surface, v) * law.repulsion(wall.gap)) * wall.inward);
       });
 }
 

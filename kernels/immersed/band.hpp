@@ -7,15 +7,14 @@
 namespace corpuscle {
 
 /// Unit face normals, and vertex normals weighted by the angle at the vertex.
-inline void pseudo_normals(const SurfaceSet& s, const PseudoNormals& normals) {
-  const auto x = s.x;
-  const auto triangle = s.triangle;
-  const auto start = s.ring_start, ring = s.ring_triangle;
+inline void pseudo_normals(const SurfaceSet& set, const PseudoNormals& normals) {
+  const SurfaceSet s = set;
+  const auto x = set.x;
   const auto face = normals.face, vertex = normals.vertex;
   Kokkos::parallel_for(
       "corpuscle::immersed::face_normals", Policy(0, s.triangles), KOKKOS_LAMBDA(int t) {
-        const Vec3 a = load(x, triangle(t, 0));
-        const Vec3 n = cross(load(x, triangle(t, 1)) - a, load(x, triangle(t, 2)) - a);
+        const Vec3 a = load(x, s.triangle(t, 0));
+        const Vec3 n = cross(load(x, s.triangle(t, 1)) - a, load(x, s.triangle(t, 2)) - a);
         const double length = norm(n);
         store(face, t, n * (length > 0 ? 1 / length : 0));
       });
@@ -23,10 +22,10 @@ inline void pseudo_normals(const SurfaceSet& s, const PseudoNormals& normals) {
       "corpuscle::immersed::vertex_normals", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
         const Vec3 at = load(x, v);
         Vec3 sum;
-        for (int r = start(v); r < start(v + 1); ++r) {
-          const int t = ring(r);
-          const int corner = triangle(t, 0) == v ? 0 : (triangle(t, 1) == v ? 1 : 2);
-          const Vec3 p = load(x, triangle(t, (corner + 1) % 3)) - at, q = load(x, triangle(t, (corner + 2) % 3)) - at;
+        for (int r = s.ring_start(v); r < s.ring_start(v + 1); ++r) {
+          const int t = s.ring_triangle(r);
+          const int corner = s.triangle(t, 0) == v ? 0 : (s.triangle(t, 1) == v ? 1 : 2);
+          const Vec3 p = load(x, s.triangle(t, (corner + 1) % 3)) - at, q = load(x, s.triangle(t, (corner + 2) % 3)) - at;
           sum += std::atan2(norm(cross(p, q)), dot(p, q)) * load(face, t);
         }
         store(vertex, v, sum);

@@ -342,14 +342,13 @@ inline void build_pressure_rows(const StencilInput& input, int count,
 /// Velocity of the surface at the rows' feet: [row, 3], um/us.
 inline void interpolate_surface_velocity(const SurfaceSet& surface, const FootViews& feet, int count,
                                          const Components<double>& u_surface) {
-  const auto v = surface.v;
-  const auto triangle = surface.triangle;
+  const SurfaceSet s = surface;
   const FootViews in = feet;
   const auto out = u_surface;
   Kokkos::parallel_for(
       "corpuscle::immersed::surface_velocity", Policy(0, count), KOKKOS_LAMBDA(int n) {
         Vec3 sum;
-        for (int k = 0; k < 3; ++k) sum += in.weight(n, k) * load(v, triangle(in.triangle(n), k));
+        for (int k = 0; k < 3; ++k) sum += in.weight(n, k) * load(s.v, s.triangle(in.triangle(n), k));
         store(out, n, sum);
       });
 }

@@ -12,29 +12,26 @@ KOKKOS_INLINE_FUNCTION Vec3 area_vector(const Vec3& a, const Vec3& b, const Vec3
   return 0.5 * cross(b - a, c - a);
 }
 
-template <class Triangles, class Positions>
-KOKKOS_INLINE_FUNCTION Vec3 area_vector(const Triangles& triangle, const Positions& x, int t) {
-  return area_vector(load(x, triangle(t, 0)), load(x, triangle(t, 1)), load(x, triangle(t, 2)));
+/// Of triangle t of a set.
+KOKKOS_INLINE_FUNCTION Vec3 area_vector(const SurfaceSet& s, int t) {
+  return area_vector(load(s.x, s.triangle(t, 0)), load(s.x, s.triangle(t, 1)), load(s.x, s.triangle(t, 2)));
 }
 
-/// Refresh set.normal and set.area from set.x, for all bodies.
+/// Refresh normal and area from x, for all bodies.
 inline void update_surface_geometry(const SurfaceSet& set) {
-  const auto x = set.x, normal = set.normal;
-  const auto area = set.area;
-  const auto triangle = set.triangle;
-  const auto ring_start = set.ring_start, ring_triangle = set.ring_triangle;
+  const SurfaceSet s = set;
   Kokkos::parallel_for(
-      "corpuscle::surface::surface_geometry", Policy(0, set.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::surface::surface_geometry", Policy(0, s.vertices), KOKKOS_LAMBDA(int i) {
         Vec3 sum;
         double ring_area = 0;
-        for (int r = ring_start(i); r < ring_start(i + 1); ++r) {
-          const Vec3 a = area_vector(triangle, x, ring_triangle(r));
+        for (int r = s.ring_start(i), end = s.ring_start(i + 1); r < end; ++r) {
+          const Vec3 a = area_vector(s, s.ring_triangle(r));
           sum += a;
           ring_area += norm(a);
         }
         const double length = norm(sum);
-        store(normal, i, length > 0 ? sum * (1 / length) : sum);
-        area(i) = ring_area / 3;
+        store(s.normal, i, length > 0 ? sum * (1 / length) : sum);
+        s.area(i) = ring_area / 3;
       });
 }
 

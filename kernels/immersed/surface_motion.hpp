@@ -11,8 +11,8 @@ namespace corpuscle {
 /// the corners, the mean corner velocity times the area vector, exactly. mean [body, 3] = mean velocity of the surface.
 inline void body_growth(const SurfaceSet& set, const Array<double>& growth, const Table<double>& mean) {
   using Team = Kokkos::TeamPolicy<Exec>;
-  const auto x = set.x, v = set.v;
-  const auto triangle = set.triangle;
+  const SurfaceSet s = set;
+  const auto v = set.v;
   const auto first = set.first_triangle;
   Kokkos::parallel_for(
       "corpuscle::immersed::body_growth", Team(set.bodies, Kokkos::AUTO),
@@ -23,8 +23,8 @@ inline void body_growth(const SurfaceSet& set, const Array<double>& growth, cons
             Kokkos::TeamThreadRange(team, first(body), first(body + 1)),
             [&](int t, Sums<5>& sum) {
               const Vec3 velocity =
-                  (1.0 / 3) * (load(v, triangle(t, 0)) + load(v, triangle(t, 1)) + load(v, triangle(t, 2)));
-              const Vec3 vector = area_vector(triangle, x, t);
+                  (1.0 / 3) * (load(v, s.triangle(t, 0)) + load(v, s.triangle(t, 1)) + load(v, s.triangle(t, 2)));
+              const Vec3 vector = area_vector(s, t);
               const double area = norm(vector);
               sum[0] += dot(velocity, vector);
               sum[1] += area;
@@ -45,8 +45,8 @@ inline void fill_inside_velocity(const IndexSpace& index, const SurfaceSet& set,
   const auto kind = nodes.kind;
   const auto body = nodes.body;
   const auto key = band.key;
+  const SurfaceSet s = set;
   const auto v = set.v;
-  const auto triangle = set.triangle;
   const int triangles = set.triangles;
   for_owned("corpuscle::immersed::inside_velocity", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
@@ -56,7 +56,7 @@ inline void fill_inside_velocity(const IndexSpace& index, const SurfaceSet& set,
     if (key(c) != no_key) {
       const int t = static_cast<int>(key_item(key(c)) % static_cast<unsigned>(triangles));
       velocity =
-          (1.0 / 3) * (load(v, triangle(t, 0)) + load(v, triangle(t, 1)) + load(v, triangle(t, 2)));
+          (1.0 / 3) * (load(v, s.triangle(t, 0)) + load(v, s.triangle(t, 1)) + load(v, s.triangle(t, 2)));
     }
     store(u, c, velocity);
   });

@@ -57,7 +57,7 @@ KOKKOS_INLINE_FUNCTION Vec3 pressure_force(const SurfaceSet& s, const SurfaceStr
 /// Force of the fluid on vertex i, nN. Areas as of the last update_surface_geometry().
 KOKKOS_INLINE_FUNCTION Vec3 fluid_force(const SurfaceSet& s, const SurfaceStress& stress, int i) {
   return s.area(i) * stress.viscous(i) +
-         pressure_force(s, stress, i, [&](int t) { return area_vector(s.triangle, s.x, t); });
+         pressure_force(s, stress, i, [&](int t) { return area_vector(s, t); });
 }
 
 /// Fills the pressures that are missing in `found` with the mean over the neighbours that have one, or else over the body:

@@ -9,7 +9,7 @@ namespace corpuscle {
 
 /// Normals and areas of the triangles, and area and volume of each section, at positions x [vertex, 3].
 inline void measure_membranes(const MembraneViews& m, const Components<double>& x) {
-  const auto triangle = m.surface.triangle;
+  const SurfaceSet s = m.surface;
   const auto first_triangle = m.surface.first_triangle, first_vertex = m.surface.first_vertex;
   const auto geometry = m.triangle_geometry, totals = m.totals;
   for_sections(
@@ -19,8 +19,8 @@ inline void measure_membranes(const MembraneViews& m, const Components<double>& 
         Kokkos::parallel_reduce(
             section_range(team, first_triangle(cell), first_triangle(cell + 1), section),
             [&](int t, Sums<2>& sum) {
-              const Vec3 corner = load(x, triangle(t, 0));
-              const Vec3 a = area_vector(corner, load(x, triangle(t, 1)), load(x, triangle(t, 2)));
+              const Vec3 corner = load(x, s.triangle(t, 0));
+              const Vec3 a = area_vector(corner, load(x, s.triangle(t, 1)), load(x, s.triangle(t, 2)));
               const double area = norm(a);
               store(geometry, t, a * (1 / area));
               geometry(t, 3) = area;

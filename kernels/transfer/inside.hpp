@@ -15,11 +15,10 @@ struct InsideViews {
 
 /// Triangles whose interior is `material`, by the cell they are of. Copies of cells beyond periodic sides are bodies of their own.
 struct InsideSurface {
-  Table<int> triangle;       // [triangle, 3] vertex numbers
-  Array<int> triangle_body;  // [triangle]
-  Array<int> type;           // [body]
-  Array<int> material;       // [type]
-  Table<int> turns;          // [body, 3] periods by which it has been shifted to where this block sees it
+  SurfaceSet set;
+  Array<int> type;      // [body]
+  Array<int> material;  // [type]
+  Table<int> turns;     // [body, 3] periods by which it has been shifted to where this block sees it
 };
 
 /// What a triangle changes on the lines along d of this block.
@@ -44,19 +43,19 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
 /// over all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface
 /// whose earlier crossings are at the other end. Any sum of integers is the same in any order.
 inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface,
-                            int triangles, int material, const InsideViews& inside) {
+                            int material, const InsideViews& inside) {
   for (const auto& part : inside.part) Kokkos::deep_copy(Exec(), part, 0);
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
   const InsideSurface of = surface;
   const InsideViews out = inside;
   Kokkos::parallel_for(
-      "corpuscle::transfer::inside_crossings", Policy(0, triangles), KOKKOS_LAMBDA(int t) {
-        const int body = of.triangle_body(t);
+      "corpuscle::transfer::inside_crossings", Policy(0, surface.set.triangles), KOKKOS_LAMBDA(int t) {
+        const int body = of.set.triangle_body(t);
         if (of.material(of.type(body)) != material) return;
         std::int64_t corner[3][3];
         for (int k = 0; k < 3; ++k)
-          if (!place_in_units(s, places, of.triangle(t, k), corner[k])) return;
+          if (!place_in_units(s, places, of.set.triangle(t, k), corner[k])) return;
         if (beyond_block(s.lattice.index, corner)) return;
         for (int d = 0; d < 3; ++d) add_crossings(s.lattice, corner, d, of.turns(body, d), out.part[d]);
       });

@@ -21,7 +21,7 @@ struct VertexArea {
 KOKKOS_INLINE_FUNCTION VertexArea vertex_area(const SurfaceSet& set, int v) {
   VertexArea area;
   for (int r = set.ring_start(v); r < set.ring_start(v + 1); ++r) {
-    const Vec3 a = area_vector(set.triangle, set.x, set.ring_triangle(r));
+    const Vec3 a = area_vector(set, set.ring_triangle(r));
     area.vector += a;
     area.whole += norm(a);
   }
@@ -97,7 +97,7 @@ KOKKOS_INLINE_FUNCTION int beyond_centre(const std::int64_t (&corner)[3][3], con
 inline bool jumps_beyond_knowledge(const MarkerSearch& search, const VertexPlaces& vertex_places, const SurfaceSet& set) {
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
-  const auto triangle = set.triangle;
+  const SurfaceSet surface = set;
   int broken = 0;
   Kokkos::parallel_reduce(
       "corpuscle::transfer::jump_reach", Policy(0, set.triangles),
@@ -105,7 +105,7 @@ inline bool jumps_beyond_knowledge(const MarkerSearch& search, const VertexPlace
         bool all = true, near = false;
         for (int k = 0; k < 3; ++k) {
           std::int64_t at[3];
-          const bool known = place_in_units(s, places, triangle(t, k), at);
+          const bool known = place_in_units(s, places, surface.triangle(t, k), at);
           all = all && known;
           if (!known) continue;
           const std::int64_t alone[3][3] = {{at[0], at[1], at[2]}, {at[0], at[1], at[2]}, {at[0], at[1], at[2]}};
@@ -123,7 +123,7 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
   Kokkos::deep_copy(Exec(), sums, std::int64_t(0));
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
-  const auto triangle = set.triangle;
+  const SurfaceSet surface = set;
   const auto jump = of_vertex;
   const auto sum = sums;
   Kokkos::parallel_for(
@@ -131,7 +131,7 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
         const IndexSpace& index = s.lattice.index;
         std::int64_t corner[3][3];
         for (int k = 0; k < 3; ++k)
-          if (!place_in_units(s, places, triangle(t, k), corner[k])) return;
+          if (!place_in_units(s, places, surface.triangle(t, k), corner[k])) return;
         if (beyond_block(index, corner)) return;
         visit_crossings(index, corner, d, 1, [&](const Crossing& crossing, const int (&line)[3]) {
           int centre[3] = {line[0], line[1], line[2]};
@@ -139,7 +139,7 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
           const int row = centre[d] + beyond_centre(corner, centre, crossing.sign);
           if (row < 0 || row > index.n[d]) return;
           double value = 0;
-          for (int k = 0; k < 3; ++k) value += crossing.share[k] * jump(triangle(t, k));
+          for (int k = 0; k < 3; ++k) value += crossing.share[k] * jump(surface.triangle(t, k));
           const auto part = static_cast<std::int64_t>(std::floor(-crossing.sign * scale * value + 0.5));
           Kokkos::atomic_add(&sum(index.cell(line[0], line[1], line[2]) + row * index.stride(d)), part);
         });

@@ -16,8 +16,7 @@ namespace corpuscle {
 namespace {
 
 #ifdef CORPUSCLE_HDF5
-std::vector<std::int32_t> to_int32(const Table<int>& table) {
-  const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
+std::vector<std::int32_t> to_int32(const HostMirror<Table<int>>& host) {
   return {host.data(), host.data() + host.span()};
 }
 #endif
@@ -33,13 +32,13 @@ std::unique_ptr<CellWriter> make_writer(const std::string& folder, const Comm& c
                                         std::optional<double> restart_us) {
   const auto body = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.triangle_body);
   const std::vector<std::int32_t> bodies(body.data(), body.data() + set.triangles);
-  return std::make_unique<CellWriter>(folder, comm, to_int32(set.triangle), bodies, set.vertices, restart_us, name);
+  return std::make_unique<CellWriter>(folder, comm, to_int32(triangles_on_host(set)), bodies, set.vertices, restart_us, name);
 }
 
 /// Vertices are numbered over all ranks' cells.
 std::unique_ptr<CellWriter> make_shared_writer(const std::string& folder, const Comm& comm, const SharedCells& cells,
                                                std::optional<double> restart_us) {
-  const auto triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().triangle);
+  const auto triangle = triangles_on_host(cells.surfaces());
   const auto first_vertex = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().first_vertex);
   const auto first_triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cells.surfaces().first_triangle);
   std::vector<std::int32_t> triangles, bodies;

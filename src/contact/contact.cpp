@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cells/topology.hpp"
 #include "contact/contact_pushes.hpp"
 #include "contact/find_contacts.hpp"
 #include "contact/keep_apart.hpp"
@@ -35,10 +34,15 @@ void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
   view = View(uninitialised(std::string("corpuscle::contact::") + name), rows + rows / 16 + 1, columns...);
 }
 
-void copy_behind(int count, const Components<double>& vertices, int offset, const Components<double>& behind) {
-  const Components<double> from = vertices, to = behind;
+/// Positions and areas of bodies as they are at rest, behind so many vertices.
+void place_behind(const SurfaceSet& bodies, int before, const ContactRest& at_rest) {
+  const SurfaceSet from = bodies;
+  const ContactRest to = at_rest;
   Kokkos::parallel_for(
-      "corpuscle::contact::copy_behind", Policy(0, count), KOKKOS_LAMBDA(int i) { store(to, offset + i, load(from, i)); });
+      "corpuscle::contact::place_behind", Policy(0, from.vertices), KOKKOS_LAMBDA(int i) {
+        store(to.x, before + i, load(from.x, i));
+        to.area(before + i) = from.area(i);
+      });
 }
 
 /// Parts of a workspace, one after the other.
@@ -109,23 +113,22 @@ Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, co
   if (peers) return;  // take_up() follows
   longest_way_ = followed_way * smallest_radius(surfaces, surfaces.cells);
   rest_.x = Components<double>(uninitialised("corpuscle::contact::rest_x"), surfaces.vertices, 3);
-  rest_.shift = Array<int>("corpuscle::contact::rest_shift", surfaces.bodies);
+  rest_.area = Array<double>(uninitialised("corpuscle::contact::rest_area"), surfaces.vertices);
   copy_vertices(surfaces.vertices, surfaces.x, rest_.x);
   copy_values(surfaces.vertices, surfaces.area, rest_.area);
 }
 
-void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type, const SurfaceSet* rigid) {
+void Contact::take_up(const SurfaceSet& set, const SurfaceSet& types, const SurfaceSet* rigid) {
   surface_ = set;
   make_arrays();
-  grow(rest_.shift, "rest_shift", set.bodies);
-  fill_rest(types, type, surface_, 0, movable_, 0, rest_.shift, rest_.area);
   if (rigid) {
     grow(rest_.x, "rest_x", types.vertices + rigid->vertices, 3);
-    copy_vertices(types.vertices, types.x, rest_.x);
-    copy_behind(rigid->vertices, rigid->x, types.vertices, rest_.x);
-    fill_rest(*rigid, type, surface_, movable_, surface_.vertices, types.vertices, rest_.shift, rest_.area);
+    grow(rest_.area, "rest_area", types.vertices + rigid->vertices);
+    place_behind(types, 0, rest_);
+    place_behind(*rigid, types.vertices, rest_);
   } else {
     rest_.x = types.x;
+    rest_.area = types.area;
   }
   if (longest_way_ == 0) longest_way_ = followed_way * smallest_radius(types, types.bodies);
 }
@@ -135,7 +138,6 @@ void Contact::make_arrays() {
   const int vertices = surface_.vertices;
   movable_ = last_value(surface_.first_vertex, surface_.cells);
   own_ = peers_ ? surface_.own_vertices : movable_;
-  grow(rest_.area, "rest_area", vertices);
   grow(lists_.first, "first_item", vertices + 1);
   grow(lists_.first_group, "first_contact", vertices + 1);
   grow(listed_, "listed_x", vertices, 3);

@@ -44,9 +44,9 @@ class Contact {
   Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
           double blend_um, const ContactPeers* peers = nullptr);
 
-  /// The surfaces are others from now on: those of `set`, of the types of cells in `types`. look() must follow.
-  /// @param type   [body] of set: rigid ones are of the types in `rigid`, by number
-  void take_up(const SurfaceSet& set, const SurfaceSet& types, const Array<int>& type, const SurfaceSet* rigid = nullptr);
+  /// The surfaces are others from now on: those of `set`, whose places are of the types of cells in `types` and, behind them, of the
+  /// bodies `rigid`. look() must follow.
+  void take_up(const SurfaceSet& set, const SurfaceSet& types, const SurfaceSet* rigid = nullptr);
 
   /// What is near what at the surfaces' present positions. Crossings are counted, told and undone.
   /// @param dt  of the next step, us
@@ -78,7 +78,7 @@ class Contact {
   double energy(double dt) const;
   /// Their force on a rigid body, nN, of all ranks, and its power, nW. @param body  its number among these
   std::array<double, 4> load_on_rigid(double dt, int body) const;
-  const Array<double>& rest_area() const { return rest_.area; }
+  const ContactRest& at_rest() const { return rest_; }
   /// Up to which gap other bodies are looked for, um.
   double reach() const { return reach_.other; }
   const ContactReport& report() const { return report_; }

@@ -79,7 +79,7 @@ double Contact::fastest_crossing(double dt) const {
   const auto first = host_of(lists_.first_group), item = host_of(now_.item);
   const auto gap = host_of(now_.gap);
   const auto weight = host_of(now_.weight), normal = host_of(now_.normal);
-  const auto triangle = host_of(surface_.triangle);
+  const auto triangle = triangles_on_host(surface_);
   const auto v = host_of(surface_.v);
   double most = 0;
   const auto body = host_of(surface_.vertex_body);

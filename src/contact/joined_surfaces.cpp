@@ -31,6 +31,18 @@ void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
   view = View(uninitialised(std::string("corpuscle::contact::joined_") + name), rows + rows / 64 + 1, columns...);
 }
 
+/// In `joined` the tables of cells' types, and behind them those of rigid bodies.
+void join_tables(const SurfaceSet& types, const SurfaceSet& rigid, SurfaceSet& joined) {
+  const std::size_t triangles = types.triangles + rigid.triangles, vertices = types.vertices + rigid.vertices;
+  grow(joined.place_triangle, "place_triangle", triangles, 3);
+  grow(joined.place_neighbour, "place_neighbour", triangles, 3);
+  grow(joined.place_ring_start, "place_ring_start", vertices + 1);
+  grow(joined.place_ring_triangle, "place_ring_triangle", 3 * triangles);
+  grow(joined.place_ring_corner, "place_ring_corner", 3 * triangles);
+  append_tables(types, 0, 0, joined);
+  append_tables(rigid, types.vertices, types.triangles, joined);
+}
+
 std::vector<int> differences(const std::vector<int>& first) {
   std::vector<int> counts;
   for (std::size_t b = 0; b + 1 < first.size(); ++b) counts.push_back(first[b + 1] - first[b]);
@@ -62,13 +74,9 @@ void JoinedSurfaces::make_room() {
   const std::size_t vertices = set_.vertices, triangles = set_.triangles, bodies = set_.bodies;
   grow(set_.x, "x", vertices, 3);
   grow(set_.v, "v", vertices, 3);
-  grow(set_.vertex_body, "vertex_body", vertices);
-  grow(set_.ring_start, "ring_start", vertices + 1);
-  grow(set_.triangle, "triangle", triangles, 3);
-  grow(set_.neighbour, "neighbour", triangles, 3);
+  grow(set_.vertex_body, "vertex_body", vertices + 1);
   grow(set_.triangle_body, "triangle_body", triangles);
-  grow(set_.ring_triangle, "ring_triangle", 3 * triangles);
-  grow(set_.ring_corner, "ring_corner", 3 * triangles);
+  grow(set_.to_place, "to_place", bodies + 1, 2);
   grow(set_.first_vertex, "first_vertex", bodies + 1);
   grow(set_.first_triangle, "first_triangle", bodies + 1);
   grow(set_.number, "number", bodies);
@@ -97,8 +105,10 @@ void JoinedSurfaces::take_up(const SurfaceSet& cells, const SurfaceSet& template
   fill(set_.first_triangle, first_triangle);
   fill(set_.number, number);
   fill(type_, types);
-  if (set_.cells > 0) fill_topology(templates, type_, set_, 0, set_.cells);
-  if (set_.bodies > set_.cells) fill_topology(rigid_, type_, set_, set_.cells, set_.bodies);
+  if (!set_.place_triangle.data()) join_tables(templates, rigid_, set_);
+  if (set_.cells > 0) place_bodies(templates, type_, set_, 0, set_.cells);
+  if (set_.bodies > set_.cells)
+    place_bodies(rigid_, type_, set_, set_.cells, set_.bodies, {templates.vertices, templates.triangles});
   Kokkos::deep_copy(images_.laps_then, images_.laps);
   update(cells);
 }

@@ -29,8 +29,6 @@ class JoinedSurfaces {
   /// Cells first; a rigid body's number is that among the rigid bodies.
   const SurfaceSet& set() const { return set_; }
   const SurfaceSet& rigid() const { return rigid_; }
-  /// [body] of set(): the type of a cell, the number of a rigid body.
-  const Array<int>& type() const { return type_; }
 
  private:
   void make_room();
@@ -39,7 +37,7 @@ class JoinedSurfaces {
   std::vector<int> body_;                        // [image]
   std::vector<int> rigid_vertices_, rigid_triangles_;  // [rigid body]
   RigidImages images_;
-  Array<int> type_;
+  Array<int> type_;  // [body] of a cell; of a rigid body its number
 };
 
 }  // namespace corpuscle

@@ -128,9 +128,9 @@ void CellLoads::take_up() {
   Kokkos::deep_copy(force_, 0.0);
   if (joined_) {
     joined_->take_up(set, membranes_.templates(), membranes_.views().type);
-    contact_->take_up(joined_->set(), membranes_.templates(), joined_->type(), &joined_->rigid());
+    contact_->take_up(joined_->set(), membranes_.templates(), &joined_->rigid());
   } else if (contact_) {
-    contact_->take_up(set, membranes_.templates(), membranes_.views().type);
+    contact_->take_up(set, membranes_.templates());
   }
   if (push_.empty()) return;
   if (const std::size_t rows = membranes_.cells() + 1; !share_.data() || share_.extent(0) < rows)
@@ -158,7 +158,7 @@ void CellLoads::look_at_start(double dt) {
 }
 
 WallContacts CellLoads::at_walls(double reach) const {
-  return {transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces().x, reach};
+  return {transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces(), reach};
 }
 
 void CellLoads::note_wall_gap() {
@@ -195,7 +195,7 @@ void CellLoads::add_walls(double dt) {
   const ContactLaw law = contact_->law(dt);
   const std::size_t vertices = membranes_.surfaces().vertices;
   const Components<double> of_walls(workspace_->reserve(3 * vertices), vertices, 3);
-  wall_forces(at_walls(law.range), law, contact_->rest_area(), of_walls);
+  wall_forces(at_walls(law.range), law, contact_->at_rest(), of_walls);
   cells_.add_copies(of_walls);
   add_forces(membranes_.vertices(), of_walls, force_);
 }
@@ -211,7 +211,7 @@ double CellLoads::contact_energy(double dt) const {
   const double between = contact_->energy(dt);
   if (!walls_.any()) return between;
   const ContactLaw law = contact_->law(dt);
-  return between + comm_.sum(wall_energy(at_walls(law.range), law, contact_->rest_area()));
+  return between + comm_.sum(wall_energy(at_walls(law.range), law, contact_->at_rest()));
 }
 
 std::optional<ContactReport> CellLoads::report() const {

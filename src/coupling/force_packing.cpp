@@ -97,14 +97,14 @@ void ForceCoupling::check_packing() {
   settings.range_um = packed_gap_ + reach;
   const ContactPeers peers{comm, [this] { cells_->to_copies(surfaces().x, true); }};
   Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
-  contact.take_up(surfaces(), membranes_->templates(), membranes_->views().type);
+  contact.take_up(surfaces(), membranes_->templates());
   contact.look_at_start(lengths_us_.front());
   packing_->gaps_seen_um = settings.range_um;
   packing_->smallest_gap_um =
       comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
   const WallSides sides = walls_of(scene_.boundaries);
   const double to_side =
-      sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, settings.range_um}) : 1e30;
+      sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);
   if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
   throw InputError(fmt::format("populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "

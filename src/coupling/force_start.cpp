@@ -35,7 +35,7 @@ void ForceCoupling::warn_of_walls() const {
   const Comm& comm = fluid_.grid().comm();
   const double spacing = fluid_.grid().mean_spacing();
   const double least =
-      comm.min(least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces().x, near * spacing}));
+      comm.min(least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), near * spacing}));
   if (least < near * spacing)
     warn("a cell starts {:.2g} um from a wall, {:.2g} spacings of the grid, and there is no [contact]: nothing resolves the film between "
          "them, and that the cell goes through the wall would be seen late; add [contact], move the cell (center_um), or refine the grid "

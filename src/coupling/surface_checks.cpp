@@ -3,6 +3,7 @@
 #include "common/vec3.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
+#include "immersed/surface.hpp"
 #include "membrane/reference.hpp"
 #include "membrane/surface_file.hpp"
 #include "parallel/agree.hpp"
@@ -21,7 +22,7 @@ namespace {
 /// All surfaces on the host.
 struct HostSurfaces {
   explicit HostSurfaces(const SurfaceSet& s)
-      : set(s), x(copy(s.x)), normal(copy(s.normal)), area(copy(s.area)), triangle(copy(s.triangle)),
+      : set(s), x(copy(s.x)), normal(copy(s.normal)), area(copy(s.area)), triangle(triangles_on_host(s)),
         first_vertex(copy(s.first_vertex)), first_triangle(copy(s.first_triangle)) {
     for (int b = 0; b < s.bodies; ++b) {
       Triple low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};

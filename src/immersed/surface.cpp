@@ -21,15 +21,16 @@ void allocate(SurfaceSet& set, const std::vector<TriangleMesh>& bodies, int cell
   set.v = Components<double>("corpuscle::surface::v_vertex", set.vertices, 3);
   set.normal = Components<double>(label("normal_vertex"), set.vertices, 3);
   set.area = Array<double>(label("area_vertex"), set.vertices);
-  set.triangle = Table<int>(label("triangle"), set.triangles, 3);
-  set.neighbour = Table<int>(label("neighbour"), set.triangles, 3);
-  set.vertex_body = Array<int>(label("vertex_body"), set.vertices);
+  set.place_triangle = Table<int>(label("place_triangle"), set.triangles, 3);
+  set.place_neighbour = Table<int>(label("place_neighbour"), set.triangles, 3);
+  set.vertex_body = Array<int>(label("vertex_body"), set.vertices + 1);
   set.triangle_body = Array<int>(label("triangle_body"), set.triangles);
   set.first_vertex = Array<int>(label("first_vertex"), set.bodies + 1);
   set.first_triangle = Array<int>(label("first_triangle"), set.bodies + 1);
-  set.ring_start = Array<int>(label("ring_start"), set.vertices + 1);
-  set.ring_triangle = Array<int>(label("ring_triangle"), 3 * set.triangles);
-  set.ring_corner = Array<std::int8_t>(label("ring_corner"), 3 * set.triangles);
+  set.to_place = Table<int>("corpuscle::surface::to_place", set.bodies + 1, 2);  // numbers are places
+  set.place_ring_start = Array<int>(label("place_ring_start"), set.vertices + 1);
+  set.place_ring_triangle = Array<int>(label("place_ring_triangle"), 3 * set.triangles);
+  set.place_ring_corner = Array<std::int8_t>(label("place_ring_corner"), 3 * set.triangles);
   set.number = Array<int>(label("number_body"), set.bodies);
 }
 
@@ -41,15 +42,15 @@ struct HostSet {
   }
   explicit HostSet(const SurfaceSet& set)
       : x(mirror(set.x)),
-        triangle(mirror(set.triangle)),
-        neighbour(mirror(set.neighbour)),
+        triangle(mirror(set.place_triangle)),
+        neighbour(mirror(set.place_neighbour)),
         vertex_body(mirror(set.vertex_body)),
         triangle_body(mirror(set.triangle_body)),
         first_vertex(mirror(set.first_vertex)),
         first_triangle(mirror(set.first_triangle)),
-        ring_start(mirror(set.ring_start)),
-        ring_triangle(mirror(set.ring_triangle)),
-        ring_corner(mirror(set.ring_corner)),
+        ring_start(mirror(set.place_ring_start)),
+        ring_triangle(mirror(set.place_ring_triangle)),
+        ring_corner(mirror(set.place_ring_corner)),
         number(mirror(set.number)),
         cells(set.cells) {}
 
@@ -78,21 +79,22 @@ struct HostSet {
       }
     }
     ring_start(vertices) = entries;
+    vertex_body(vertices) = body + 1;
     first_vertex(body + 1) = vertices;
     first_triangle(body + 1) = triangles;
   }
 
   void copy_to(const SurfaceSet& set) const {
     Kokkos::deep_copy(set.x, x);
-    Kokkos::deep_copy(set.triangle, triangle);
-    Kokkos::deep_copy(set.neighbour, neighbour);
+    Kokkos::deep_copy(set.place_triangle, triangle);
+    Kokkos::deep_copy(set.place_neighbour, neighbour);
     Kokkos::deep_copy(set.vertex_body, vertex_body);
     Kokkos::deep_copy(set.triangle_body, triangle_body);
     Kokkos::deep_copy(set.first_vertex, first_vertex);
     Kokkos::deep_copy(set.first_triangle, first_triangle);
-    Kokkos::deep_copy(set.ring_start, ring_start);
-    Kokkos::deep_copy(set.ring_triangle, ring_triangle);
-    Kokkos::deep_copy(set.ring_corner, ring_corner);
+    Kokkos::deep_copy(set.place_ring_start, ring_start);
+    Kokkos::deep_copy(set.place_ring_triangle, ring_triangle);
+    Kokkos::deep_copy(set.place_ring_corner, ring_corner);
     Kokkos::deep_copy(set.number, number);
   }
 
@@ -114,7 +116,8 @@ SurfaceSet make_surface_set(const std::vector<TriangleMesh>& bodies, int cells) 
   if (bodies.empty()) {
     Kokkos::deep_copy(set.first_vertex, 0);
     Kokkos::deep_copy(set.first_triangle, 0);
-    Kokkos::deep_copy(set.ring_start, 0);
+    Kokkos::deep_copy(set.place_ring_start, 0);
+    Kokkos::deep_copy(set.vertex_body, 0);
     return set;
   }
   HostSet host(set);
@@ -139,9 +142,19 @@ std::string body_name(const SurfaceSet& surfaces, int body) {
   return (body < surfaces.cells ? "cells." : "bodies.") + std::to_string(number(body));
 }
 
+HostMirror<Table<int>> triangles_on_host(const SurfaceSet& set) {
+  const SurfaceSet s = set;
+  const Table<int> vertices(uninitialised("corpuscle::surface::triangles"), s.triangles, 3);
+  Kokkos::parallel_for(
+      "corpuscle::surface::triangles", Policy(0, s.triangles), KOKKOS_LAMBDA(int t) {
+        for (int k = 0; k < 3; ++k) vertices(t, k) = s.triangle(t, k);
+      });
+  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), vertices);
+}
+
 TriangleMesh body_mesh(const SurfaceSet& surfaces, int body) {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.x);
-  const auto triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.triangle);
+  const auto triangle = triangles_on_host(surfaces);
   const auto first_vertex = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.first_vertex);
   const auto first_triangle = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces.first_triangle);
   TriangleMesh mesh;

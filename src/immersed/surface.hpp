@@ -26,6 +26,9 @@ struct CellNames {
 /// As the case file addresses it: "cells.0", "populations.0 cell 17", "bodies.2".
 std::string body_name(const SurfaceSet& surfaces, int body);
 
+/// [triangle, 3] vertex numbers.
+HostMirror<Table<int>> triangles_on_host(const SurfaceSet& set);
+
 /// Positions of one body's vertices and its triangles, copied back to the host.
 TriangleMesh body_mesh(const SurfaceSet& surfaces, int body);
 

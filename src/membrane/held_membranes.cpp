@@ -57,7 +57,11 @@ Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Wo
   std::vector<TriangleMesh> meshes;
   for (const CellReference& type : types_) meshes.push_back(type.mesh);
   templates_ = make_surface_set(meshes);
-  views_ = make_membrane_views(make_surface_set({}), types_, {});
+  SurfaceSet none = make_surface_set({});
+  none.place_triangle = templates_.place_triangle, none.place_neighbour = templates_.place_neighbour;
+  none.place_ring_start = templates_.place_ring_start;
+  none.place_ring_triangle = templates_.place_ring_triangle, none.place_ring_corner = templates_.place_ring_corner;
+  views_ = make_membrane_views(none, types_, {});
   make_viscosity();
   if (viscosity_) viscosity_->prepare(types_);
   status_host_ = HostCopy(views_.status);
@@ -93,13 +97,9 @@ void Membranes::make_room(const SurfaceSet& needed) {
   extend(set.v, "v_vertex", needed.vertices);
   grow(set.normal, "normal_vertex", needed.vertices, 3);
   grow(set.area, "area_vertex", needed.vertices);
-  grow(set.vertex_body, "vertex_body", needed.vertices);
-  grow(set.ring_start, "ring_start", needed.vertices + 1);
-  grow(set.triangle, "triangle", needed.triangles, 3);
-  grow(set.neighbour, "neighbour", needed.triangles, 3);
+  grow(set.vertex_body, "vertex_body", needed.vertices + 1);
   grow(set.triangle_body, "triangle_body", needed.triangles);
-  grow(set.ring_triangle, "ring_triangle", 3 * std::size_t(needed.triangles));
-  grow(set.ring_corner, "ring_corner", 3 * std::size_t(needed.triangles));
+  grow(set.to_place, "to_place", needed.bodies + 1, 2);
   grow(set.first_vertex, "first_vertex", needed.bodies + 1);
   grow(set.first_triangle, "first_triangle", needed.bodies + 1);
   grow(set.number, "number_body", needed.bodies);
@@ -144,7 +144,7 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   fill(set.first_triangle, first_triangle);
   fill(set.number, number);
   fill(views_.type, type);
-  if (set.bodies > 0) fill_topology(templates_, views_.type, set, 0, set.bodies);
+  if (set.bodies > 0) place_bodies(templates_, views_.type, set, 0, set.bodies);
   if (viscosity_) viscosity_->hold(views_);
   describe_cells(cells, own);
   stiffness_.clear();

@@ -52,9 +52,9 @@ void Cytosol::join_rows(int d) {
 void Cytosol::update(const Transfer& transfer, const SurfaceSet& surfaces, const BodyKinds& kinds) {
   const IndexSpace& index = grid_->index();
   Kokkos::deep_copy(Exec(), broken_, 0);
-  const InsideSurface surface{surfaces.triangle, surfaces.triangle_body, kinds.type, material_, kinds.turns};
+  const InsideSurface surface{surfaces, kinds.type, material_, kinds.turns};
   for (std::size_t m = 0; m < ratios_.size(); ++m) {
-    count_crossings(transfer.search(), transfer.places(), surface, surfaces.triangles, static_cast<int>(m), inside_);
+    count_crossings(transfer.search(), transfer.places(), surface, static_cast<int>(m), inside_);
     for (int d = 0; d < 3; ++d) {
       join_rows(d);
       add_up_inside(index, d, row_[d]->size() == 1, inside_.part[d], broken_);

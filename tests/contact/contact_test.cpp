@@ -180,7 +180,7 @@ TEST_CASE("lists find what looking at every triangle finds", "[contact]") {
   Noise noise;
   for (int round = 0; round < 4; ++round) {
     const auto x = on_host(set.x);
-    const auto triangle = on_host(set.triangle);
+    const auto triangle = triangles_on_host(set);
     const auto of_vertex = on_host(set.vertex_body), of_triangle = on_host(set.triangle_body);
     const auto first = on_host(contact.lists().first_group);
     const auto item = on_host(contact.contacts().item);

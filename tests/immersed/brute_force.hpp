@@ -16,7 +16,7 @@ struct Soup {
 
   explicit Soup(const SurfaceSet& s, const std::vector<Vec3>& shifts = {Vec3{}}) {
     const auto x = on_host(s.x);
-    const auto t = on_host(s.triangle);
+    const auto t = triangles_on_host(s);
     const auto b = on_host(s.triangle_body);
     for (const Vec3& shift : shifts) {
       for (int e = 0; e < s.triangles; ++e) {

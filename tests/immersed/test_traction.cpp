@@ -198,7 +198,7 @@ struct Moments {
 };
 Moments moments(const SurfaceSet& surface) {
   const auto x = on_host(surface.x);
-  const auto triangle = on_host(surface.triangle);
+  const auto triangle = triangles_on_host(surface);
   Moments m;
   for (int t = 0; t < surface.triangles; ++t) {
     const Vec3 a = load(x, triangle(t, 0)), b = load(x, triangle(t, 1)), c = load(x, triangle(t, 2));
@@ -250,7 +250,7 @@ TEST_CASE("a vertex that no fluid node informs takes the pressure of its neighbo
   const SurfaceStress stress = make_surface_stress("corpuscle::test::stress", surface.vertices);
   const Components<double> traction("corpuscle::test::traction", surface.vertices, 3);
   const auto host = Kokkos::create_mirror_view(found.values);
-  const auto triangle = on_host(surface.triangle);
+  const auto triangle = triangles_on_host(surface);
   for (int i = 0; i < surface.vertices; ++i) host(i, 0) = i < per_body ? 1e3 + i : 50 + i;
   // One alone; and one with all its neighbours, which leaves it the mean over its body.
   const int alone = 3, enclosed = per_body + 7;

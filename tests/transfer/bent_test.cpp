@@ -138,8 +138,12 @@ TEST_CASE("of two walls in a corner the nearer one counts, whichever it is", "[c
   for (auto& pair : all.wall) pair[0] = pair[1] = true;
   ContactLaw law;
   law.range = law.reach = 0.4, law.pressure = 0.02, law.knee = 0.05;
-  const Array<double> area("corpuscle::test::area", 1);
-  Kokkos::deep_copy(area, 1.0);
+  SurfaceSet point;
+  point.vertex_body = Array<int>("corpuscle::test::body", 1);
+  point.to_place = Table<int>("corpuscle::test::to_place", 1, 2);
+  ContactRest rest;
+  rest.area = Array<double>("corpuscle::test::area", 1);
+  Kokkos::deep_copy(rest.area, 1.0);
   for (int near = 0; near < 3; ++near)
     for (int end = 0; end < 2; ++end) {
       Triple p;
@@ -150,10 +154,11 @@ TEST_CASE("of two walls in a corner the nearer one counts, whichever it is", "[c
       const auto x = to_device({p});
       Transfer transfer(grid, sides(walls), CouplingSettings::Kernel::three_point, 1);
       transfer.place(x);
-      const WallContacts contacts{transfer.block().lattice, transfer.views(), all, x, 0.4};
+      point.x = x;
+      const WallContacts contacts{transfer.block().lattice, transfer.views(), all, point, 0.4};
       CHECK(least_wall_gap(contacts) == Approx(0.1).epsilon(1e-9));
       Components<double> force("corpuscle::test::force", 1, 3);
-      wall_forces(contacts, law, area, force);
+      wall_forces(contacts, law, rest, force);
       const auto f = on_host(force);
       CHECK(f(0, near) * (end == 0 ? 1 : -1) == Approx(law.repulsion(0.1)).epsilon(1e-9));
       CHECK(std::abs(f(0, (near + 1) % 3)) < 1e-12);
