@@ -89,7 +89,6 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
 /// The vertices are others than before.
 void ForceCoupling::take_up() {
   transfer_->take_up(surfaces());
-  renewed_ = true;
   Kokkos::deep_copy(membranes_->views().force, 0.0);
   if (!scene_.coupling->slip) return;
   const std::size_t vertices = surfaces().vertices;
@@ -110,9 +109,8 @@ std::string ForceCoupling::vertex_text(int vertex) const {
 /// Where the vertices are in the grid.
 /// @throws ComputationError  if one is outside
 void ForceCoupling::place(double time) {
-  const double beyond = transfer_->place(surfaces().x) >= 0 ? 1 : 0;
-  if (fluid_.grid().comm().max(beyond) > 0 || renewed_) check_all_at_home(time);
-  renewed_ = false;
+  transfer_->place(surfaces().x);
+  check_all_at_home(time);
   watch_outflow();
 }
 

@@ -129,7 +129,6 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
   Components<double> followed_;                 // [vertex, 1] share of the forces that slip follows; only with slip
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
-  bool renewed_ = true;       // the vertices are others than at the last place()
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely
   /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.
