@@ -38,6 +38,9 @@ class MembraneViscosity {
   /// (beta A + D) v = mode + q dV/dx. The other arrays are overwritten. Only with hold(); otherwise as resist().
   void relieve(const MembraneViews& m, Workspace& workspace, double beta, const StiffnessViews& work);
 
+  /// So that resist() and relieve() find room in the workspace as it is.
+  void reserve(const MembraneViews& m, Workspace& workspace) const { workspace.reserve(scratch_numbers(m)); }
+
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
              const Components<double>& force) const;
@@ -52,12 +55,14 @@ class MembraneViscosity {
   std::size_t scratch_numbers(const MembraneViews& m) const;
   void divide_scratch(const MembraneViews& m, double* memory);
   /// @param m  whose velocities are U and become v  @param damping  [vertex, 3] becomes D v
-  template <class Damping>
-  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
-  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
+  template <class Damping, class Taken>
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const;
+  template <class Taken>
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const;
 
   bool tangential_;
-  Components<double> given_;  // only with hold(); views_.right_side is then what the last resist() took off
+  Components<double> given_;  // [vertex, 3] nN; only with hold()
+  Components<float> taken_;   // [vertex, 3] nN, what the last resist() took off, of which only the power is told; only with hold()
   Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
   ViscousBand band_;  // without teams: conjugate gradients

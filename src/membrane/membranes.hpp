@@ -103,6 +103,8 @@ class Membranes {
   /// @param beta  mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
   ///              deformations; twice that is too much
   void resist(double beta, const Components<double>& force);
+  /// The workspace no longer holds the triangles' geometry: where it is wanted after all, it is measured again.
+  void forget_geometry();
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
   /// a run warns at its end, beyond the second it is stopped.
@@ -112,7 +114,7 @@ class Membranes {
 
   /// [vertex] how many times as fast as at rest the membrane answers tangential forces per area there, about and at most.
   /// After compute_forces().
-  void measure_stiffening(const Array<double>& stiffening) const;
+  void measure_stiffening(const Array<double>& stiffening);
 
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
   int substeps(double dt_us, double beta) const;
@@ -186,6 +188,7 @@ class Membranes {
   void describe_cells(const std::vector<HeldCell>& cells, int own);
   void make_room(const SurfaceSet& needed);
   void take_workspace();
+  void take_geometry();
   void estimate_stiffness();
   void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                      const Components<double>& v_star);
