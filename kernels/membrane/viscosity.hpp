@@ -46,7 +46,7 @@ struct ViscosityViews {
   Array<int> neighbour;                        // [ring entry] vertex that it leads to
   Array<double> inverse_length;                // [ring entry] 1/um, of the edge to it
   Array<double> diagonal;                      // [vertex] M/dt + beta A, pg/us
-  Table<double> block;                         // [vertex, 6] inverse of the diagonal 3x3 block
+  Table<double> block;                         // [vertex, 6] inverse of the diagonal 3x3 block; none where the matrix is factorised
   Components<double> right_side;               // [vertex, 3] nN
   Components<double> gradient;                 // [vertex, 3] dV/dx, um2
   Components<double> residual, search, image;  // [vertex, 3]
@@ -148,6 +148,7 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
           b.xy += c * e.x * e.y, b.xz += c * e.x * e.z, b.yz += c * e.y * e.z;
         }
         store(w.right_side, i, inertia * load(v, i) + driving_force(m, outside, i, area, reaction));
+        if (w.block.extent(0) == 0) return;
         const double d = diagonal + times * (last - first) * Damping::isotropic(law);
         b.xx += d, b.yy += d, b.zz += d;
         const Symmetric3 inv = inverse(b);
@@ -379,9 +380,9 @@ void solve_held(const MembraneViews& m, const ViscosityViews& w) {
 }
 
 /// damping = D v, which is taken off m.force and, if it is another array, off `force`.
-template <class Damping>
+template <class Damping, class Taken>
 void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v,
-                      const Components<double>& force, const Components<double>& damping) {
+                      const Components<double>& force, const Taken& damping) {
   const bool two = force.data() != m.force.data();
   Kokkos::parallel_for(
       "corpuscle::membrane::subtract_damping", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
@@ -416,12 +417,12 @@ void dissipative_force(const MembraneViews& m, const ViscosityViews& w, const Co
 }
 
 /// Sum of damping . v, nW.
-inline double damping_power(const MembraneViews& m, const Components<double>& damping) {
+inline double damping_power(const MembraneViews& m, const Components<float>& damping) {
   const auto v = m.surface.v;
   double power = 0;
   Kokkos::parallel_reduce(
       "corpuscle::membrane::damping_power", Policy(0, m.vertices),
-      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(load(damping, i), load(v, i)); }, power);
+      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(Vec3{damping(i, 0), damping(i, 1), damping(i, 2)}, load(v, i)); }, power);
   return power;
 }
 

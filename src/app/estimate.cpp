@@ -200,14 +200,37 @@ void require_below(double count, const char* what, const char* remedy, const cha
                                limit, remedy));
 }
 
+/// Bytes of a vertex' lists of the triangles within `range`, um, and the skin: four tenths of what membranes have everywhere alike,
+/// since a cell does not touch what is next to a vertex in its own membrane.
+double of_lists(const SceneSize& size, double range) {
+  constexpr double skin = 0.5, apart = 0.4, triangle = 4, body = 64, triangles_of_body = 20;
+  const double r = (1 + skin) * range, dense = size.volume > 0 ? 2 * (size.vertices - size.rigid) / size.volume : 0;
+  return std::min(2 * (size.vertices - size.rigid), apart * dense * 4 / 3 * std::acos(-1.0) * r * r * r) * (triangle + body / triangles_of_body);
+}
+
+/// Bytes of a vertex, for [contact] and for the look at packed cells' gaps before the first step, of which there is one at a time.
+double of_contact(const Case& scene, const SceneSize& size) {
+  constexpr double contact = 56, look = 32, blended = 1.5, seen_beyond = 0.3;
+  double most = 0;
+  if (scene.contact) {
+    const double h = std::max({size.spacing[0], size.spacing[1], size.spacing[2]});
+    const double attracted = scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0;
+    most = contact + of_lists(size, std::max({scene.contact->range_um, attracted, scene.coupling->slip ? blended * h : 0}));
+  }
+  double gap = 1e30;
+  for (const auto& population : scene.populations) gap = std::min(gap, population.gap_um);
+  if (!scene.populations.empty()) most = std::max(most, (scene.contact ? contact : 0) + look + of_lists(size, gap + seen_beyond));
+  return most;
+}
+
 /// Bytes on a rank.
 double of_shared_cells(const Case& scene, const SceneSize& size) {
-  // Of a vertex and its two triangles: surface, places and markers; of an own one, motion and the room of the forces' parts.
-  double vertex = 310, own = 236;
+  // Of a vertex and its two triangles: surface, places, markers and their weights; of an own one, motion and the room of the forces' parts.
+  double vertex = 315, own = 88;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
-  if (any_cell(scene, viscous)) own += 8 * 2 * 3;  // MembraneViscosity
+  if (any_cell(scene, viscous)) own += 3 * (8 + 4);  // MembraneViscosity
   if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 40;
-  if (scene.contact) vertex += 70 + 4 * 80;  // what contact knows of a vertex, and of some four that it may touch
+  vertex += of_contact(scene, size);
   return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
 }
 

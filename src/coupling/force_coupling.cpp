@@ -407,6 +407,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     }
     cells_->to_copies(forces());
     if (scene_.coupling->slip) limit_slip(dt);
+    membranes_->forget_geometry();
     const SlipViews slip = slip_of_membranes();
     const SlipViews* const used = scene_.coupling->slip ? &slip : nullptr;
     if (sharp_pressure())

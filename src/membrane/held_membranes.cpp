@@ -27,10 +27,11 @@ void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
 }
 
 /// With its content.
-void extend(Components<double>& view, const char* name, std::size_t rows) {
+template <class Real>
+void extend(Components<Real>& view, const char* name, std::size_t rows) {
   if (has_room(view, rows)) return;
-  const Components<double> before = view;
-  view = Components<double>(std::string("corpuscle::membrane::") + name, roomy(rows), 3);
+  const Components<Real> before = view;
+  view = Components<Real>(std::string("corpuscle::membrane::") + name, roomy(rows), 3);
   if (!before.data()) return;
   const auto all = std::make_pair(std::size_t(0), before.extent(0));
   Kokkos::deep_copy(Kokkos::subview(view, all, Kokkos::ALL), before);
@@ -48,7 +49,7 @@ void fill(const Array<int>& view, const std::vector<int>& values) {
 void MembraneViscosity::hold(const MembraneViews& m) {
   extend(given_, "given_vertex", m.vertices);
   extend(past_, "past_vertex", m.vertices);
-  extend(views_.right_side, "right_side_vertex", m.vertices);
+  extend(taken_, "taken_vertex", m.vertices);
   grow(views_.iterations, "iterations_cell", m.cells);
 }
 
@@ -104,7 +105,6 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(set.first_triangle, "first_triangle", needed.bodies + 1);
   grow(set.number, "number_body", needed.bodies);
   grow(views_.type, "type_body", needed.bodies);
-  grow(views_.triangle_geometry, "triangle_geometry", views_.triangles, 4);
   grow(views_.totals, "totals_section", std::size_t(views_.cells) * sections, 2);
   grow(views_.force, "force_vertex", needed.vertices, 3);
   grow(motion_.sums, "motion_sums_section", std::size_t(views_.cells) * sections, 2);
@@ -112,13 +112,32 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(start_x_, "start_x_vertex", views_.vertices, 3);
 }
 
-/// What is only of use within a call lies where others have such things in between.
+/// What is only of use within a call lies where others have such things in between: forces of corners, or directions. The triangles'
+/// geometry is kept there from compute_forces() on, until the forces are on their way.
 void Membranes::take_workspace() {
   if (!workspace_) return;
   const std::size_t triangles = views_.triangles, vertices = views_.vertices;
-  double* memory = workspace_->reserve(9 * triangles + 3 * vertices);
+  workspace_->keep(4 * triangles);
+  double* memory = workspace_->reserve(std::max(9 * triangles, 3 * vertices));
   views_.corner_force = Table<double>(memory, triangles, 9);
-  motion_.direction = Components<double>(memory + 9 * triangles, vertices, 3);
+  motion_.direction = Components<double>(memory, vertices, 3);
+  views_.triangle_geometry = Table<double>(workspace_->keep(4 * triangles), triangles, 4);
+}
+
+/// The triangles' geometry where it is at present, measured again if it was let go.
+void Membranes::take_geometry() {
+  if (!workspace_) return;
+  const bool known = workspace_->kept() > 0;
+  if (viscosity_) {
+    workspace_->keep(4 * static_cast<std::size_t>(views_.triangles));
+    viscosity_->reserve(views_, *workspace_);  // which may move it
+  }
+  take_workspace();
+  if (!known) measure_membranes(views_, views_.surface.x);
+}
+
+void Membranes::forget_geometry() {
+  if (workspace_) workspace_->release();
 }
 
 void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
@@ -140,6 +159,7 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   views_.vertices = first_vertex[own];
   views_.triangles = first_triangle[own];
   make_room(set);
+  forget_geometry();
   fill(set.first_vertex, first_vertex);
   fill(set.first_triangle, first_triangle);
   fill(set.number, number);

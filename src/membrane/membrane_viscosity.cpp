@@ -17,8 +17,9 @@ auto label(const char* name) { return uninitialised(std::string("corpuscle::memb
 }  // namespace
 
 std::size_t MembraneViscosity::scratch_numbers(const MembraneViews& m) const {
-  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles), vectors = band_.teams > 0 ? 1 : 5;
-  return entries + (entries + 1) / 2 + (7 + 3 * vectors) * static_cast<std::size_t>(m.vertices);
+  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles);
+  const std::size_t numbers = (given_.data() ? 4 : 1) + 3 + (band_.teams > 0 ? 0 : 6 + 4 * 3);  // of each vertex, as divided below
+  return entries + (entries + 1) / 2 + numbers * static_cast<std::size_t>(m.vertices);
 }
 
 /// A cell of n vertices takes about n^2 operations in a factorisation, and about as many in conjugate gradients, which take four times
@@ -67,9 +68,10 @@ void MembraneViscosity::divide_scratch(const MembraneViews& m, double* memory) {
   views_.inverse_length = Array<double>(take(entries), entries);
   views_.neighbour = Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries);
   views_.diagonal = Array<double>(take(vertices), vertices);
-  views_.block = Table<double>(take(6 * vertices), vertices, 6);
   views_.gradient = Components<double>(take(3 * vertices), vertices, 3);
+  if (given_.data()) views_.right_side = Components<double>(take(3 * vertices), vertices, 3);
   if (band_.teams > 0) return;
+  views_.block = Table<double>(take(6 * vertices), vertices, 6);
   for (auto* vectors : {&views_.residual, &views_.search, &views_.image, &views_.inverse_gradient})
     *vectors = Components<double>(take(3 * vertices), vertices, 3);
 }
@@ -87,8 +89,8 @@ void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elastici
   }
 }
 
-template <class Damping>
-void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const {
+template <class Damping, class Taken>
+void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const {
   constexpr double massless = 1e300;  // us: mass over it
   ViscosityViews views = views_;
   views.times = 1 + fluid.share;
@@ -100,7 +102,8 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction&
   subtract_damping<Damping>(m, views_, m.surface.v, fluid.force, damping);
 }
 
-void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const {
+template <class Taken>
+void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const {
   if (tangential_)
     resist_with<FullDamping>(m, fluid, damping);
   else
@@ -110,7 +113,7 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction&
 void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead,
                                const Components<double>& force) {
   divide_scratch(m, workspace.reserve(scratch_numbers(m)));
-  resist_with(m, {beta, share_, ahead, m.surface.v, given_, force, past_}, views_.right_side);
+  resist_with(m, {beta, share_, ahead, m.surface.v, given_, force, past_}, taken_);
   copy_vertices(m.vertices, force, given_);
 }
 
@@ -122,7 +125,7 @@ void MembraneViscosity::relieve(const MembraneViews& m, Workspace& workspace, do
   Kokkos::deep_copy(work.force_ahead, 0.0);
   Kokkos::deep_copy(work.force_behind, 0.0);
   resist_with(at_rest, {beta, share_, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, work.probe);
-  Kokkos::deep_copy(views_.right_side, 0.0);  // nothing has been taken off any force yet
+  Kokkos::deep_copy(taken_, 0.0f);  // nothing has been taken off any force yet
 }
 
 template <class Damping>
@@ -139,11 +142,10 @@ void MembraneViscosity::damp(const MembraneViews& m, Workspace& workspace, const
     damp_with<FullDamping>(m, work);
   else
     damp_with<CentralDamping>(m, work);
-  Kokkos::deep_copy(views_.right_side, 0.0);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {
-  if (given_.data()) return damping_power(m, views_.right_side);  // they move as the fluid does, not quite as D was told
+  if (given_.data()) return damping_power(m, taken_);  // they move as the fluid does, not quite as D was told
   return tangential_ ? viscous_power<FullDamping>(m) : viscous_power<CentralDamping>(m);
 }
 

@@ -45,6 +45,8 @@ class MembraneViscosity {
 
   /// The forces by which D resists the unit mode, into work.mode; the other arrays are overwritten. As relieve().
   void damp(const MembraneViews& m, Workspace& workspace, const StiffnessViews& work);
+  /// So that resist() and relieve() find room in the workspace as it is.
+  void reserve(const MembraneViews& m, Workspace& workspace) const { workspace.reserve(scratch_numbers(m)); }
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
   void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -60,15 +62,18 @@ class MembraneViscosity {
   std::size_t scratch_numbers(const MembraneViews& m) const;
   void divide_scratch(const MembraneViews& m, double* memory);
   /// @param m  whose velocities are U and become v  @param damping  [vertex, 3] becomes D v
-  template <class Damping>
-  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
-  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Components<double>& damping) const;
+  template <class Damping, class Taken>
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const;
+  template <class Taken>
+  void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const;
+
   template <class Damping>
   void damp_with(const MembraneViews& m, const StiffnessViews& work) const;
 
   bool tangential_;
-  Components<double> given_, past_;  // only with hold(); views_.right_side is then what the last resist() took off
   double share_ = 0;
+  Components<double> given_, past_;  // [vertex, 3] nN; only with hold()
+  Components<float> taken_;   // [vertex, 3] nN, what the last resist() took off, of which only the power is told; only with hold()
   Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
   ViscousBand band_;  // without teams: conjugate gradients

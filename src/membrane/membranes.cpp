@@ -101,6 +101,7 @@ void Membranes::estimate_stiffness() {
   const StiffnessViews work = make_stiffness_views(views_);
   const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
   largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue);
+  forget_geometry();
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), eigenvalue);
   stiffness_.assign(host.data(), host.data() + views_.cells);
   for (int c = 0; c < views_.cells; ++c) {
@@ -151,12 +152,15 @@ void Membranes::resist(double beta, double ahead, const Components<double>& forc
   if (std::exchange(resists_anew_, false)) ahead = 0;
   if (!viscosity_ || views_.cells == 0) return;
   Kokkos::deep_copy(views_.status, 0);
+  take_geometry();
   viscosity_->resist(views_, *workspace_, beta, ahead, force);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
-void Membranes::measure_stiffening(const Array<double>& stiffening) const {
-  if (views_.cells > 0) elasticity_->measure_stiffening(views_, stiffening);
+void Membranes::measure_stiffening(const Array<double>& stiffening) {
+  if (views_.cells == 0) return;
+  take_geometry();
+  elasticity_->measure_stiffening(views_, stiffening);
 }
 
 template <class Load>
@@ -223,13 +227,14 @@ void Membranes::set_out(double ahead_us) {
 
 void Membranes::drift(double dt) {
   if (views_.cells == 0) return;
-  take_workspace();
+  take_geometry();
   Kokkos::deep_copy(views_.status, 0);
   measure_drift(views_, motion_);
   project_and_drift(views_, motion_, start_x_, (1 - share_ahead_) * dt);
   measure_membranes(views_, views_.surface.x);
   measure_drift(views_, motion_);
   restore_volume(views_, motion_, volume_rate * dt);
+  forget_geometry();
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
@@ -275,6 +280,7 @@ double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const st
 double Membranes::largest_resistance(const MobilityModel& model, const std::vector<int>& numbers) {
   const std::vector<int> cells = cells_of(numbers);
   if (cells.empty() || !viscosity_) return 0;
+  take_geometry();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   const MembraneViews first_cells = up_to(views_, cells.back() + 1, first(cells.back() + 1));
@@ -283,6 +289,7 @@ double Membranes::largest_resistance(const MobilityModel& model, const std::vect
     viscosity_->damp(first_cells, *workspace_, work);
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
   }
+  forget_geometry();
   return largest_of(work, cells);
 }
 
@@ -296,7 +303,7 @@ void Membranes::take_share_of_resistance(double share) {
 double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta) {
   constexpr double distance = 1e-4;  // um, as for the stiffness
   const bool viscous = viscosity_ && workspace_ && beta > 0;
-  take_workspace();
+  take_geometry();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
@@ -313,6 +320,7 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
     }
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
   }
+  forget_geometry();
   return largest_of(work, cells);
 }
 
@@ -389,7 +397,9 @@ std::vector<CellDiagnostics> Membranes::diagnostics() {
   if (views_.cells == 0) return {};
   using Column = CellColumn;
   const Table<double> table(uninitialised("corpuscle::membrane::diagnostics_cell"), views_.cells, Column::count);
+  take_workspace();
   elasticity_->measure_cells(views_, table);
+  forget_geometry();
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table);
   std::vector<CellDiagnostics> all(views_.cells);
   for (int c = 0; c < views_.cells; ++c) {

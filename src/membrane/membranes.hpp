@@ -108,6 +108,8 @@ class Membranes {
   void resist_anew() { resists_anew_ = true; }
   /// Of membrane viscosity, in what resist() takes for the fluid's answer to short waves: see largest_resistance(). None at first.
   void take_share_of_resistance(double share);
+  /// The workspace no longer holds the triangles' geometry: where it is wanted after all, it is measured again.
+  void forget_geometry();
 
   /// Membranes break when their area has grown by 2 to 4 % (Evans, Waugh and Melnik, Biophys. J. 16, 1976): beyond the first
   /// a run warns at its end, beyond the second it is stopped.
@@ -120,7 +122,7 @@ class Membranes {
 
   /// [vertex] how many times as fast as at rest the membrane answers tangential forces per area there, about and at most.
   /// After compute_forces().
-  void measure_stiffening(const Array<double>& stiffening) const;
+  void measure_stiffening(const Array<double>& stiffening);
 
   /// Sub-steps that advance() takes for a step of `dt_us`, from the stiffness last estimated.
   int substeps(double dt_us, double beta) const;
@@ -201,6 +203,7 @@ class Membranes {
   void describe_cells(const std::vector<HeldCell>& cells, int own);
   void make_room(const SurfaceSet& needed);
   void take_workspace();
+  void take_geometry();
   void estimate_stiffness();
   void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
                      const Components<double>& v_star);

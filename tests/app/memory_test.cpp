@@ -97,6 +97,31 @@ TEST_CASE("memory of cells that ranks share out is announced within a quarter of
   }
 }
 
+TEST_CASE("what a cell takes of a run's memory stays below its bound") {
+  const auto folder = fresh_folder("memory_of_a_cell");
+  constexpr int across = 4, layers = 4, cells = across * across * layers;
+  const auto taken = [&](int count) {  // red cells in layers, of which there is room for all
+    std::ofstream out(folder / "dense.toml");
+    out << "[time]\nstep_us = 5\nend_us = 10\n[grid]\ngenerator = \"box\"\nnodes = [45, 45, 17]\nlower_um = [0, 0, 0]\n"
+           "upper_um = [35.2, 35.2, 12.8]\n[fluid]\nconvection = false\n[output]\nfields = false\ncells = false\n"
+           "[[cell_types]]\nname = \"rbc\"\nviscosity_ratio = 5\nmembrane_viscosity_N_s_per_m = 5e-7\n";
+    for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"})
+      out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"wall\"\n";
+    for (int n = 0; n < count; ++n)
+      out << "[[cells]]\ntype = \"rbc\"\ncenter_um = [" << 8.8 * (n % across) + 4.4 << ", " << 8.8 * (n / across % across) + 4.4 << ", "
+          << 3.2 * (n / across / across) + 1.6 << "]\n";
+    out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.25\n";
+    out.close();
+    fs::remove_all(folder / "out");
+    succeed(folder, {"run", (folder / "dense.toml").string(), "--out", "out"}, {.threads = 1});
+    return report(folder / "out")["peak_rss_mb"].get<double>();
+  };
+  // Some pages of the grid's arrays, and what set-up had, are in one run alone: 3 MB of some 20.
+  const double of_cell = (taken(cells) - taken(1)) / (cells - 1);
+  INFO(of_cell << " MB a cell");
+  CHECK(of_cell < 0.32);
+}
+
 TEST_CASE("a rank's memory for cells is that of its share") {
   const auto folder = fresh_folder("memory_of_share");
   const auto size_of = [&](int layers, int ranks) {
@@ -123,6 +148,8 @@ TEST_CASE("what cells take is announced for packed ones as for those that are li
   const auto plain = mb({}), thick = mb({"cell_types.0.viscosity_ratio=5"}), stiff = mb({"cell_types.0.membrane_viscosity_N_s_per_m=5e-7"});
   CHECK(thick.fields > 1.1 * plain.fields);  // a viscosity that varies takes a field, and a hierarchy of its own
   CHECK(stiff.surfaces > 1.02 * plain.surfaces);
+  // That packed cells are as far apart as they should is seen with lists of what is near.
+  CHECK(mb({"populations.0.gap_um=2"}).surfaces > 2 * mb({"populations.0.gap_um=0.1"}).surfaces);
 }
 
 TEST_CASE("a scene that does not fit is refused at once") {

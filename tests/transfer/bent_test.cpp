@@ -121,10 +121,11 @@ TEST_CASE("a wall is near only where its cells are: not behind the plane in whic
   WallSides all;
   for (auto& pair : all.wall) pair[0] = pair[1] = true;
   const auto least = [&](const std::vector<Triple>& points, double reach) {
-    const auto x = to_device(points);
+    SurfaceSet set;
+    set.x = to_device(points);
     Transfer transfer(grid, sides(walls), CouplingSettings::Kernel::three_point, static_cast<int>(points.size()));
-    transfer.place(x);
-    return comm.min(least_wall_gap({transfer.block().lattice, transfer.views(), all, x, reach}));
+    transfer.place(set.x);
+    return comm.min(least_wall_gap({transfer.block().lattice, transfer.views(), all, set, reach}));
   };
   CHECK(least(middle, 1) == 1e30);
   CHECK(least(middle, 2) == Approx(12 * 4 * pi / 3 / stations).epsilon(0.02));  // to the ends, along the arc
