@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.hpp"
-#include "core/log.hpp"
 #include "coupling/surface_checks.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "parallel/agree.hpp"
@@ -28,22 +26,6 @@ Case without_cells(const Case& scene) {
   rest.coupling = scene.coupling;
   rest.bodies = scene.bodies;
   return rest;
-}
-
-/// Along index direction d: the grid's volume over the area that it is swept with.
-double mean_spacing(const Grid& grid, int d) {
-  const IndexSpace index = grid.index();
-  const Components<double> area = grid.views().face_area[d];
-  const double swept = sum_owned("corpuscle::coupling::swept_area", index,
-                                 KOKKOS_LAMBDA(int i, int j, int k) { return norm(load(area, index.cell(i, j, k))); });
-  return grid.total_volume() / grid.comm().sum(swept);
-}
-
-/// The least and the greatest of the mean spacings along the grid's directions.
-std::pair<double, double> spacings(const Grid& grid) {
-  const double along[3] = {mean_spacing(grid, 0), mean_spacing(grid, 1), mean_spacing(grid, 2)};
-  const auto [least, most] = std::minmax_element(along, along + 3);
-  return {*least, *most};
 }
 
 /// Within which cells act on each other, um.
@@ -139,20 +121,6 @@ void ForceCoupling::check_all_at_home(double time) {
   });
 }
 
-void ForceCoupling::watch_outflow() {
-  outflow_ = {};
-  for (const auto& boundary : scene_.boundaries) {
-    const int side = static_cast<int>(boundary.side), d = side / 2, end = side % 2;
-    const auto& lattice = transfer_->block().lattice;
-    if (boundary.type != BoundarySettings::Type::outflow || !(end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d]))
-      continue;
-    const NearSide near = nearest_to_side(transfer_->block(), transfer_->views(), d, end);
-    if (near.distance < outflow_.distance) outflow_ = near;
-  }
-  const double least = fluid_.grid().comm().min(outflow_.distance);
-  if (outflow_.distance > least) outflow_ = {least, -1};
-}
-
 /// The viscosity, with the membranes where place() found them.
 /// @throws ComputationError  if there is no saying what is inside them
 void ForceCoupling::fill_cells(double time) {
@@ -203,14 +171,7 @@ void ForceCoupling::check_start() {
   } catch (const ComputationError& error) {  // before the first step it is the input that is wrong
     throw InputError(error.what());
   }
-  outflow_limit_ = scene_.time.stop_before_outflow_um;
-  if (outflow_.distance < outflow_limit_) {
-    outflow_limit_ = 0.5 * outflow_.distance;
-    warn(
-        "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left instead of "
-        "time.stop_before_outflow_um = {:g}; move the cell (center_um) or lengthen the grid",
-        nearest_outflow(), outflow_limit_, scene_.time.stop_before_outflow_um);
-  }
+  limit_outflow();
   warn_of_image();
   if (packing_ && !small_) check_packing();
   find_softest();
@@ -220,161 +181,6 @@ void ForceCoupling::check_start() {
   warn_of_walls();
   warn_of_pressed_start();
   refuse_long_steps();
-}
-
-/// @throws InputError
-void ForceCoupling::refuse_long_steps() const {
-  const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
-  if (!(longest <= stable_us_))
-    throw InputError(
-        fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "
-                    "{:.3g} us{} they "
-                    "would swing and grow. Reduce time.step_us{}",
-                    longest, stable_us_, scene_.coupling->slip ? " with the slip correction" : "",
-                    scene_.coupling->slip ? ", or set coupling.slip = false" : ""));
-}
-
-/// A cell that is alone meets itself beyond periodic sides.
-void ForceCoupling::warn_of_image() const {
-  constexpr double near = 0.25;  // of its extent
-  if (cells_->total() != 1 || (loads_ && loads_->report())) return;
-  std::string text;
-  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces().x);
-  for (int d = 0; d < 3 && !cells_->own().empty(); ++d) {
-    if (!fluid_.grid().index().periodic[d]) continue;
-    const Triple& period = fluid_.grid().period(d);
-    const double length = std::hypot(period[0], period[1], period[2]);
-    double low = 1e300, high = -1e300;
-    for (int v = 0; v < membranes_->vertices(); ++v) {
-      const double along = (x(v, 0) * period[0] + x(v, 1) * period[1] + x(v, 2) * period[2]) / length;
-      low = std::min(low, along), high = std::max(high, along);
-    }
-    if (length - (high - low) < near * (high - low))
-      text = fmt::format("{} is {:.3g} um from its own image beyond a periodic side, and there is no [contact]: that they cross would "
-                         "not be seen; add [contact], or use a larger grid",
-                         body_name(surfaces(), 0), length - (high - low));
-  }
-  text = agree(fluid_.grid().comm(), text);
-  if (!text.empty()) warn("{}", text);
-}
-
-/// Of the largest stable step: up to there steps are of second order.
-constexpr double second_order_share = 0.54;
-
-/// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
-/// mean of the velocities at both ends: second order. Longer steps than half the largest stable one would swing then: those are
-/// Euler's.
-bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share * stable_us_; }
-
-/// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the
-/// outer one, which is all that resists the slip.
-double ForceCoupling::resisting_share() const {
-  double share = 1;
-  for (const CellReference& type : membranes_->types()) share = std::min(share, 0.5 * (1 + type.viscosity_ratio));
-  return share;
-}
-
-/// Where beta alone stands for the fluid's answer, short waves wait for it, 1 / (beta m) steps where a wave's mobility is m.
-void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers) {
-  constexpr double share = 0.5;  // unstable above 4/3
-  const double resistance = fluid_.grid().comm().max(membranes_->largest_resistance(model, numbers));
-  short_waves_ = resistance > 0 ? share / resistance : 0;
-  membranes_->take_share_of_resistance(short_waves_);
-}
-
-/// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
-/// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
-/// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
-/// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
-/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two.
-void ForceCoupling::measure_stability() {
-  constexpr double limit = 1.5, of_dipoles = 2;
-  const auto [narrowest, widest] = spacings(fluid_.grid());
-  update_surface_geometry(surfaces());
-  MobilityModel model;
-  model.viscosity = fluid_.viscosity() * resisting_share();
-  model.radius = transfer_->marker_radius() * narrowest;
-  if (scene_.coupling->slip) {
-    model.slip = slip_of_membranes().law.coefficient * transfer_->largest_slip() * widest;
-    model.dipole = of_dipoles * transfer_->largest_dipole() * resisting_share() * widest;
-    model.width = 0.8 * narrowest;
-  }
-  // Of each type the same cell on any number of ranks: what slip is held to goes by this.
-  std::vector<int> numbers = membranes_->first_of_types();
-  for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));
-  // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
-  const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
-  anticipate_short_waves(model, numbers);
-  const double fastest =
-      std::max(membranes_->fastest_relaxation_per_us(model, numbers, beta), loads_ ? loads_->fastest_relaxation_per_us() : 0);
-  stable_us_ = limit / fluid_.grid().comm().max(fastest);
-}
-
-std::string ForceCoupling::stability_text(double dt) const {
-  return fmt::format(
-      "coupling: steps of {:.3g} us, of {} order; membranes that move with the fluid are stable up to about {:.3g} us{}", dt,
-      second_order(dt) ? "second" : "first", stable_us_, scene_.coupling->slip ? " with the slip correction (coupling.slip)" : "");
-}
-
-std::map<std::string, double> ForceCoupling::report(double dt) const {
-  std::map<std::string, double> figures{{"largest_stable_step_us", stable_us_}, {"margin", stable_us_ / dt}};
-  if (contact_report()) figures["contact_linear_below_um"] = loads_->knee_um(dt);
-  return figures;
-}
-
-/// How far the fluid gets in two steps at the fastest that it has been: a cell that is nearer may leave the grid before it is
-/// looked at again. A reference speed that is only the one told from rest says nothing of it.
-double ForceCoupling::two_steps_um(double dt) const {
-  const auto& fluid = fluid_.statistics();
-  return 2 * dt * (fluid.reference_speed > quiet_speed_ ? fluid.reference_speed : fluid.speed);
-}
-
-bool ForceCoupling::at_outflow(double dt) const { return outflow_.distance < std::max(outflow_limit_, two_steps_um(dt)); }
-
-std::string ForceCoupling::outflow_limit(double dt) const {
-  const double two_steps = two_steps_um(dt);
-  if (two_steps > outflow_limit_) return fmt::format("{:.3g} um, as far as the flow gets in two steps (time.step_us)", two_steps);
-  return fmt::format("{:.3g} um (time.stop_before_outflow_um)", outflow_limit_);
-}
-
-std::string ForceCoupling::nearest_outflow() const {
-  const std::string text =
-      outflow_.vertex < 0 ? "" : fmt::format("{} is {:.3g} um from an outflow", vertex_text(outflow_.vertex), outflow_.distance);
-  return agree(fluid_.grid().comm(), text);
-}
-
-/// How the fluid's force on membranes changes with their velocity, per area, where it does so least: the largest deformation of
-/// one cell alone (a quadrupole of its size), or of all cells together, as the longest shear wave that the grid has room for.
-double ForceCoupling::anticipated_reaction(double dt) const {
-  const Softest& s = softest_;
-  if (s.area == 0) return 0;
-  const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;
-  const double depth = fluid_.grid().total_volume() / s.area;
-  return std::min(3 * mu / s.radius, depth * (mu * s.wave_number_square + rho / dt));
-}
-
-void ForceCoupling::find_softest() {
-  if (!membranes_->viscosity()) return;
-  softest_ = {};
-  const double pi = std::acos(-1.0);
-  const Grid& grid = fluid_.grid();
-  double largest = 0;
-  for (const auto& cell : membranes_->diagnostics()) {
-    softest_.area += cell.area_um2;
-    largest = std::max(largest, cell.area_um2);
-  }
-  softest_.area = grid.comm().sum(softest_.area);
-  softest_.radius = std::sqrt(grid.comm().max(largest) / (4 * pi));
-  double longest = 0, square = 0;
-  for (int d = 0; d < 3; ++d) {
-    const double length = grid.index().global[d] * mean_spacing(grid, d);
-    longest = std::max(longest, length);
-    const auto held = [&](const BoundarySettings& b) {
-      return static_cast<int>(b.side) / 2 == d && (b.type == BoundarySettings::Type::wall || b.type == BoundarySettings::Type::moving_wall);
-    };
-    if (std::count_if(scene_.boundaries.begin(), scene_.boundaries.end(), held) == 2) square += std::pow(pi / length, 2);
-  }
-  softest_.wave_number_square = square > 0 ? square : std::pow(2 * pi / longest, 2);
 }
 
 StepStatistics ForceCoupling::advance(double time, double dt) {
@@ -434,15 +240,6 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
   statistics.coupling_iterations = 1;
   statistics.substeps = 1;
   return statistics;
-}
-
-/// Slip is stiff: all that grows with the stiffness is left to the grid's velocity once a step could no longer follow.
-void ForceCoupling::limit_slip(double dt) {
-  const double most = (second_order(dt) ? second_order_share : 1.0) * stable_us_ / dt;
-  const Array<double> share(followed_.data(), followed_.extent(0));
-  membranes_->measure_stiffening(share);
-  corpuscle::limit_slip(membranes_->vertices(), most, share);
-  cells_->to_copies(followed_);
 }
 
 /// Cells that have come to this rank, copies that are others than before, and bodies that have come back through a side, are looked at

@@ -75,6 +75,7 @@ class ForceCoupling : public Coupling {
   void check_jumps(double time_us);
   void take_up();
   void watch_outflow();
+  void limit_outflow();
   /// What fails on one rank fails on all.
   template <class Work>
   void together(const Work& work) const {

@@ -7,6 +7,8 @@
 #include "core/log.hpp"
 #include "coupling/force_coupling.hpp"
 #include "fluid/boundary_conditions.hpp"
+#include "immersed/surface.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
@@ -41,6 +43,30 @@ void ForceCoupling::warn_of_walls() const {
          "them, and that the cell goes through the wall would be seen late; add [contact], move the cell (center_um), or refine the grid "
          "(grid.nodes)",
          least, least / spacing);
+}
+
+/// A cell that is alone meets itself beyond periodic sides.
+void ForceCoupling::warn_of_image() const {
+  constexpr double near = 0.25;  // of its extent
+  if (cells_->total() != 1 || (loads_ && loads_->report())) return;
+  std::string text;
+  const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces().x);
+  for (int d = 0; d < 3 && !cells_->own().empty(); ++d) {
+    if (!fluid_.grid().index().periodic[d]) continue;
+    const Triple& period = fluid_.grid().period(d);
+    const double length = std::hypot(period[0], period[1], period[2]);
+    double low = 1e300, high = -1e300;
+    for (int v = 0; v < membranes_->vertices(); ++v) {
+      const double along = (x(v, 0) * period[0] + x(v, 1) * period[1] + x(v, 2) * period[2]) / length;
+      low = std::min(low, along), high = std::max(high, along);
+    }
+    if (length - (high - low) < near * (high - low))
+      text = fmt::format("{} is {:.3g} um from its own image beyond a periodic side, and there is no [contact]: that they cross would "
+                         "not be seen; add [contact], or use a larger grid",
+                         body_name(surfaces(), 0), length - (high - low));
+  }
+  text = agree(fluid_.grid().comm(), text);
+  if (!text.empty()) warn("{}", text);
 }
 
 /// Cells that start deep within each other's repulsion are thrown apart by it, not by the flow.

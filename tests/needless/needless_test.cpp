@@ -246,6 +246,7 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   SECTION("straight tube, iterated coupling") {
     check_flow("straight_tube", {tube, "coupling.scheme=iterated", "coupling.tolerance=0.01"});
   }
+  SECTION("cells as forces past a ball") { check_flow("obstacle", {"grid.nodes=[33,15,17]", "cell_types.0.vertices=300"}); }
   SECTION("curved tube") { check_flow("curved_tube", {"grid.nodes=[17,17,31]"}); }
 }
 
