@@ -59,16 +59,6 @@ double ForceCoupling::resisting_share() const {
   return share;
 }
 
-/// Membranes that resist their own short waves alone would wait for the fluid's answer, 1 / (beta m) steps where a wave's mobility is
-/// m. With the kink of the velocity between two fluids mobilities are larger than the model's: 0.4 in place of 0.15 was still stable
-/// at a ratio of five, 0.5 not, and carrying on in time takes a third of it.
-void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers) {
-  constexpr double share = 0.15;
-  const double resistance = fluid_.grid().comm().max(membranes_->largest_resistance(model, numbers));
-  short_waves_ = resistance > 0 ? share / resistance : 0;
-  membranes_->take_share_of_resistance(short_waves_);
-}
-
 /// Where beta alone stands for the fluid's answer, short waves wait for it, 1 / (beta m) steps where a wave's mobility is m.
 void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers) {
   constexpr double share = 0.5;  // unstable above 4/3
