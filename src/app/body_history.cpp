@@ -5,6 +5,7 @@
 #include "common/extremes.hpp"
 #include "membrane/shape_measures.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace corpuscle {
@@ -96,7 +97,9 @@ HistorySample BodyHistory::cell_sample(int cell, const CellDiagnostics& d, const
   sample.elastic_energy_fJ = d.energy_fJ();
   if (!few_cells_) return sample;
   const auto& v = d.velocity_um_per_us;
-  const bool moving = std::hypot(v[0], v[1], v[2]) > 1e-9;
+  // In a shear that goes past on both sides the way of the cell is but what rounding leaves.
+  const double slow = std::max(1e-9, 0.01 * simulation_.fluid().statistics().speed);
+  const bool moving = std::hypot(v[0], v[1], v[2]) > slow;
   const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
                                         moving ? v : axis_at_start(sample.cell));
   sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};

@@ -40,7 +40,7 @@ void ForceCoupling::refuse_long_steps() const {
                     "{:.3g} us{} they "
                     "would swing and grow. Reduce time.step_us{}",
                     longest, stable_us_, scene_.coupling->slip ? " with the slip correction" : "",
-                    scene_.coupling->slip ? ", or set coupling.slip = false" : ""));
+                    scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 
 /// Of the largest stable step: up to there steps are of second order.

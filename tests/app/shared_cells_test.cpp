@@ -123,3 +123,14 @@ TEST_CASE("few cells have lines of their own, whichever ranks have them") {
       CHECK(one.number(n, column) == Approx(two.number(n, column)).margin(1e-9));
 #endif
 }
+
+TEST_CASE("a cell that the flow goes past on both sides is measured along its own axis, not along what rounding moves it") {
+  const auto folder = fresh_folder("cell_at_rest");
+  succeed(folder, with({"run", scene("cell_shear"), "--out", "out"},
+                       {"grid.nodes=[13,13,11]", "cells.0.vertices=200", "cells.0.reference=shape", "cells.0.membrane_viscosity_N_s_per_m=1e-8",
+                        "time.end_us=1000", "output.every_us=0", "output.history_every_us=1000", "output.checkpoint_every_us=0"}));
+  const auto lines = history(folder / "out");
+  const std::size_t last = lines.lines.size() - 1;
+  CHECK(lines.number(last, "length_um") < 4);
+  CHECK(lines.number(last, "diameter_um") > 6);
+}

@@ -126,7 +126,7 @@ TEST_CASE("cytosol, membrane viscosity and slip leave a cell's memory below its 
     const double slope = (many.mb - few.mb) / (many.own + many.copies - few.own - few.copies);
     INFO(slope << " MB a cell" << (touching ? " with contact" : ""));
     if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{:.4f} MB a cell{}", slope, touching ? " with contact" : ""));
-    CHECK(slope < (touching ? 0.25 : 0.22));  // with what contact knows of a vertex, and no lists: these are too far from each other
+    CHECK(slope < (touching ? 0.26 : 0.23));  // with what contact knows of a vertex, and no lists: these are too far from each other
   }
 }
 
