@@ -80,6 +80,25 @@ KOKKOS_INLINE_FUNCTION bool adjacent(const SurfaceSet& s, int t, int other) {
   return false;
 }
 
+/// Which feature of a triangle the point with these weights is, as of TrianglePoint.
+KOKKOS_INLINE_FUNCTION int feature_of(const double (&weight)[3]) {
+  int zeros = 0, zero = 0, full = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (weight[k] == 0) ++zeros, zero = k;
+    if (weight[k] != 0) full = k;
+  }
+  return zeros == 0 ? 0 : zeros == 1 ? 1 + zero : 4 + full;
+}
+
+/// Outward, of unit length, at the place where a contact's nearest point is: on an edge of a fold the triangles' own normals would call
+/// one side of it the other.
+KOKKOS_INLINE_FUNCTION Vec3 outward_of(const SurfaceSet& s, const ContactViews& c, int g, int t) {
+  const double weight[3] = {c.weight(g, 0), c.weight(g, 1), c.weight(g, 2)};
+  const Vec3 outward = outward_at(s, t, feature_of(weight));
+  const double length = norm(outward);
+  return (length > 0 ? 1 / length : 0) * outward;
+}
+
 struct CrossingCount : Joined<CrossingCount> {
   int vertices = 0;     // on the wrong side
   int first = 1 << 30;  // the lowest contact of them
@@ -112,7 +131,7 @@ inline CrossingCount find_crossings(const SurfaceSet& surface, const ContactList
           if (c.item(g) < 0) continue;
           if (same_body(s, v, c.item(g))) {
             const int t = c.item(g), last = side(v);
-            const double across = dot(load(c.normal, g), unit_normal(s, t));
+            const double across = dot(load(c.normal, g), outward_of(s, c, g, t));
             if (std::fabs(across) < 0.5) continue;  // beside the place rather than over it
             const bool outside = across > 0;
             seen = 2 * t + (outside ? 1 : 0);

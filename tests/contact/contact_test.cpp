@@ -440,3 +440,44 @@ TEST_CASE("a cell does not touch itself as it is, is pushed apart where it is pi
   for (int v = 0; v < set.vertices; ++v)
     if (std::hypot(x(v, 0), x(v, 1)) < 0.3) CHECK(after(v, 2) * x(v, 2) > 0);
 }
+
+TEST_CASE("on which side of a sharp fold a point is does not depend on which of its triangles is asked", "[contact]") {
+  TriangleMesh blade;
+  blade.vertices = {{2, 0, 0}, {0, 2, 0}, {-2, 0, 0}, {0, -2, 0}, {0, 0, 0.2}, {0, 0, -0.2}};
+  for (int k = 0; k < 4; ++k) {
+    blade.triangles.push_back({k, (k + 1) % 4, 4});
+    blade.triangles.push_back({(k + 1) % 4, k, 5});
+  }
+  const SurfaceSet set = cells_of({blade});
+  const ContactViews contact{.weight = Table<double>("corpuscle::test::weight", 8 * 200, 3)};
+  // Around the middle of the rim and around one of its corners, outside: of all triangles whose nearest point is as near as any.
+  int asked = 0, by_features = 0, by_triangles = 0;
+  const auto ask = [&](int counted, int& total) {
+    Kokkos::parallel_reduce(
+        "corpuscle::test::sides", Policy(0, 200), KOKKOS_LAMBDA(int n, int& sum) {
+          const double angle = 0.0314159 * n, across = 0.3 * std::sin(angle), out = 0.02 + 0.1 * std::fabs(std::cos(angle));
+          const Vec3 p = n % 2 == 0 ? Vec3{1 + out, 1 + out, across} : Vec3{2 + out, 0, across};
+          double least = 1e300;
+          for (int t = 0; t < 8; ++t) {
+            const Corners k = corners(set, t, {});
+            const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+            const double distance = norm(p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c));
+            least = distance < least ? distance : least;
+          }
+          for (int t = 0; t < 8; ++t) {
+            const Corners k = corners(set, t, {});
+            const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+            const Vec3 away = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
+            if (norm(away) > least + 1e-12) continue;
+            for (int d = 0; d < 3; ++d) contact.weight(8 * n + t, d) = at.weight[d];
+            const Vec3 outward = counted == 2 ? unit_normal(set, t) : outward_of(set, contact, 8 * n + t, t);
+            sum += counted == 0 || dot(away, outward) < 0 ? 1 : 0;
+          }
+        },
+        total);
+  };
+  ask(0, asked), ask(1, by_features), ask(2, by_triangles);
+  CHECK(asked > 300);
+  CHECK(by_features == 0);
+  CHECK(by_triangles > 50);  // what it is there for
+}
