@@ -80,7 +80,7 @@ void ForceCoupling::set_state(const std::vector<double>& state) {
   small_stable_us_ = stable_us_;
   stable_us_ = of_grown(small_stable_us_, state.at(3), state.at(0));
   small_short_waves_ = short_waves_;
-  if (short_waves_ > 0 && state.at(5) > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
+  if (short_waves_ > 0 && state.size() > 5 && state[5] > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
   membranes_->take_share_of_resistance(short_waves_);
   softest_.area = state.at(1);
   softest_.radius = state.at(2);

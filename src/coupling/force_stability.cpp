@@ -6,6 +6,7 @@
 
 #include "core/error.hpp"
 #include "coupling/force_coupling.hpp"
+#include "fluid/boundary_conditions.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "transfer/vertex_forces.hpp"
 
@@ -129,14 +130,12 @@ void ForceCoupling::find_softest() {
   }
   softest_.area = grid.comm().sum(softest_.area);
   softest_.radius = std::sqrt(grid.comm().max(largest) / (4 * pi));
+  const WallSides walls = walls_of(scene_.boundaries);
   double longest = 0, square = 0;
   for (int d = 0; d < 3; ++d) {
     const double length = grid.index().global[d] * mean_spacing(grid, d);
     longest = std::max(longest, length);
-    const auto held = [&](const BoundarySettings& b) {
-      return static_cast<int>(b.side) / 2 == d && (b.type == BoundarySettings::Type::wall || b.type == BoundarySettings::Type::moving_wall);
-    };
-    if (std::count_if(scene_.boundaries.begin(), scene_.boundaries.end(), held) == 2) square += std::pow(pi / length, 2);
+    if (walls.wall[d][0] && walls.wall[d][1]) square += std::pow(pi / length, 2);
   }
   softest_.wave_number_square = square > 0 ? square : std::pow(2 * pi / longest, 2);
 }

@@ -277,20 +277,27 @@ double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const st
   return cells.empty() ? 0 : fastest_relaxation(model, cells, beta);
 }
 
-double Membranes::largest_resistance(const MobilityModel& model, const std::vector<int>& numbers) {
-  const std::vector<int> cells = cells_of(numbers);
-  if (cells.empty() || !viscosity_) return 0;
+/// Power iteration on mobility times what answer(cells, work) makes of the mode; the cells are those up to the last one asked for.
+template <class Answer>
+double Membranes::largest_response(const MobilityModel& model, const std::vector<int>& cells, const Answer& answer) {
   take_geometry();
   const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
-  const MembraneViews first_cells = up_to(views_, cells.back() + 1, first(cells.back() + 1));
+  const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
   start_mode(views_, work);
   for (int i = 0; i < power_iterations; ++i) {
-    viscosity_->damp(first_cells, *workspace_, work);
+    answer(up_to_last, work);
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
   }
   forget_geometry();
   return largest_of(work, cells);
+}
+
+double Membranes::largest_resistance(const MobilityModel& model, const std::vector<int>& numbers) {
+  const std::vector<int> cells = cells_of(numbers);
+  if (cells.empty() || !viscosity_) return 0;
+  return largest_response(model, cells,
+                          [this](const MembraneViews& m, const StiffnessViews& work) { viscosity_->damp(m, *workspace_, work); });
 }
 
 void Membranes::take_share_of_resistance(double share) {
@@ -303,25 +310,16 @@ void Membranes::take_share_of_resistance(double share) {
 double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta) {
   constexpr double distance = 1e-4;  // um, as for the stiffness
   const bool viscous = viscosity_ && workspace_ && beta > 0;
-  take_geometry();
-  const StiffnessViews work = make_stiffness_views(views_);
-  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
-  const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
-  start_mode(views_, work);
-  for (int i = 0; i < power_iterations; ++i) {
+  return largest_response(model, cells, [&](const MembraneViews& up_to_last, const StiffnessViews& work) {
     displace(views_, work, distance);
     elasticity_->membrane_forces(views_, work.probe, work.force_ahead);
     displace(views_, work, -distance);
     elasticity_->membrane_forces(views_, work.probe, work.force_behind);
     difference_forces(views_, work, distance);
-    if (viscous) {
-      viscosity_->relieve(up_to_last, *workspace_, beta, work);
-      take_workspace();
-    }
-    for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
-  }
-  forget_geometry();
-  return largest_of(work, cells);
+    if (!viscous) return;
+    viscosity_->relieve(up_to_last, *workspace_, beta, work);
+    take_workspace();
+  });
 }
 
 int Membranes::trouble() {

@@ -211,6 +211,8 @@ class Membranes {
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
   std::vector<int> cells_of(const std::vector<int>& numbers) const;
+  template <class Answer>
+  double largest_response(const MobilityModel& model, const std::vector<int>& cells, const Answer& answer);
   double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta);
   [[noreturn]] void explain(int cell, double dt);
   [[noreturn]] void explain_area(int cell, double drift) const;
