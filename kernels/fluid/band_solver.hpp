@@ -78,8 +78,28 @@ inline void factorise_band(const BandSystem& band) {
       });
 }
 
-/// x = the solution for b, both [cell] of the level. Both sweeps add multiples of columns: their order is fixed, so the
-/// answer is the same on any number of threads and lanes.
+/// Both sweeps through the factors, and what is between them, over y, [row] and `width` more on either side that are zero. They
+/// add multiples of columns: their order is fixed, so the answer is the same on any number of threads and lanes.
+KOKKOS_INLINE_FUNCTION void sweep_band(const Kokkos::TeamPolicy<Exec>::member_type& team, const BandSystem& a, double* y) {
+  for (int j = 0; j < a.rows; ++j) {
+    const double known = y[j];
+    const double* column = &a.lower(j, 1);
+    double* next = y + j + 1;
+    Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { next[d] -= known * column[d]; });
+    team.team_barrier();
+  }
+  Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] *= a.inverse(r); });
+  team.team_barrier();
+  for (int j = a.rows - 1; j > 0; --j) {
+    const double known = y[j];
+    const double* row = &a.upper(j, 1);
+    double* before = y + j - 1;
+    Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { before[-d] -= known * row[d]; });
+    team.team_barrier();
+  }
+}
+
+/// x = the solution for b, both [cell] of the level.
 inline void solve_band(const BandSystem& band, const Array<CycleReal>& b, const Array<CycleReal>& x) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const BandSystem a = band;
@@ -88,23 +108,39 @@ inline void solve_band(const BandSystem& band, const Array<CycleReal>& b, const 
         double* y = &a.x(a.width);
         Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] = b(a.cell(r)); });
         team.team_barrier();
-        for (int j = 0; j < a.rows; ++j) {
-          const double known = y[j];
-          const double* column = &a.lower(j, 1);
-          double* next = y + j + 1;
-          Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { next[d] -= known * column[d]; });
-          team.team_barrier();
-        }
-        Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] *= a.inverse(r); });
-        team.team_barrier();
-        for (int j = a.rows - 1; j > 0; --j) {
-          const double known = y[j];
-          const double* row = &a.upper(j, 1);
-          double* before = y + j - 1;
-          Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { before[-d] -= known * row[d]; });
-          team.team_barrier();
-        }
+        sweep_band(team, a, y);
         Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { x(a.cell(r)) = y[r]; });
+      });
+}
+
+/// The inverse of a factorised system, [row, width + row], with `width` zeros on either side of each row: as many sweeps as
+/// there are rows, all at once.
+inline void invert_band(const BandSystem& band, const Table<double>& inverse) {
+  using Team = Kokkos::TeamPolicy<Exec>;
+  const BandSystem a = band;
+  Kokkos::parallel_for(
+      "corpuscle::multigrid::invert_band", Team(a.rows, 1, band_lanes), KOKKOS_LAMBDA(const Team::member_type& team) {
+        const int row = team.league_rank();
+        double* y = &inverse(row, a.width);
+        Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] = r == row ? 1 : 0; });
+        team.team_barrier();
+        sweep_band(team, a, y);
+      });
+}
+
+/// x = the inverse times b, both [cell] of the level.
+inline void apply_inverse(const BandSystem& band, const Table<double>& inverse, const Array<CycleReal>& b,
+                          const Array<CycleReal>& x) {
+  using Team = Kokkos::TeamPolicy<Exec>;
+  const BandSystem a = band;
+  Kokkos::parallel_for(
+      "corpuscle::multigrid::apply_inverse", Team(a.rows, 1, band_lanes), KOKKOS_LAMBDA(const Team::member_type& team) {
+        const int row = team.league_rank();
+        double sum = 0;
+        Kokkos::parallel_reduce(
+            Kokkos::ThreadVectorRange(team, a.rows), [&](int r, double& part) { part += inverse(row, a.width + r) * b(a.cell(r)); },
+            sum);
+        Kokkos::single(Kokkos::PerThread(team), [&]() { x(a.cell(row)) = sum; });
       });
 }
 

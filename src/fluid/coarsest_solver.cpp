@@ -67,6 +67,18 @@ void BandCoarsest::solve(const MultigridLevel&, const Array<CycleReal>& b, const
   solve_band(band_, b, x);
 }
 
+InverseCoarsest::InverseCoarsest(MultigridHierarchy& hierarchy)
+    : BandCoarsest(hierarchy), inverse_("corpuscle::multigrid::inverse", band_.rows, band_.rows + 2 * band_.width) {}
+
+void InverseCoarsest::update(const MultigridLevel& level) {
+  BandCoarsest::update(level);
+  invert_band(band_, inverse_);
+}
+
+void InverseCoarsest::solve(const MultigridLevel&, const Array<CycleReal>& b, const Array<CycleReal>& x) {
+  apply_inverse(band_, inverse_, b, x);
+}
+
 AmgCoarsest::AmgCoarsest(MultigridHierarchy& hierarchy)
     : system_(hierarchy.levels().back().comm, hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
       amg_(system_) {
@@ -89,8 +101,11 @@ void AmgCoarsest::solve(const MultigridLevel& level, const Array<CycleReal>& b, 
 
 std::unique_ptr<CoarsestSolver> make_coarsest_solver(MultigridHierarchy& hierarchy) {
   const auto& last = hierarchy.levels().back();
-  if (last.comm.size() == 1 && last.views.index.owned() <= MultigridHierarchy::most_direct)
-    return std::make_unique<BandCoarsest>(hierarchy);
+  constexpr bool host_memory = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
+  if (last.comm.size() == 1 && last.views.index.owned() <= MultigridHierarchy::most_direct) {
+    if (host_memory) return std::make_unique<BandCoarsest>(hierarchy);
+    return std::make_unique<InverseCoarsest>(hierarchy);
+  }
   return std::make_unique<AmgCoarsest>(hierarchy);
 }
 

@@ -20,15 +20,28 @@ class CoarsestSolver {
   virtual void raise() {}
 };
 
-/// Direct, for a level of which each rank has the whole: it costs less than setting BoomerAMG up, which has to be done whenever bodies move, and a cycle of it.
+/// Direct, for a level of which each rank has the whole: it costs less than setting BoomerAMG up, which has to be done whenever
+/// bodies move, and a cycle of it.
 class BandCoarsest : public CoarsestSolver {
  public:
   explicit BandCoarsest(MultigridHierarchy& hierarchy);
   void update(const MultigridLevel& level) override;
   void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
 
- private:
+ protected:
   BandSystem band_;
+};
+
+/// The same, by the inverse: for devices, where one sweep after the other through a band, row by row, waits for memory all the
+/// time, but as many sweeps as there are rows take no longer than one.
+class InverseCoarsest : public BandCoarsest {
+ public:
+  explicit InverseCoarsest(MultigridHierarchy& hierarchy);
+  void update(const MultigridLevel& level) override;
+  void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
+
+ private:
+  Table<double> inverse_;
 };
 
 /// One cycle of BoomerAMG, for levels of many cells.
