@@ -48,6 +48,7 @@ std::string write_layers(const fs::path& folder, int layers, bool contact) {
 }  // namespace
 
 TEST_CASE("memory is announced within a quarter of what a run takes") {
+  if (!host_memory()) return;
   const auto folder = fresh_folder("memory");
   struct Scene {
     const char* name;
@@ -77,6 +78,7 @@ TEST_CASE("memory is announced within a quarter of what a run takes") {
 }
 
 TEST_CASE("memory of cells that ranks share out is announced within a quarter of what a run takes") {
+  if (!host_memory()) return;
   const auto folder = fresh_folder("memory_of_cells");
   struct Scene {
     int layers, ranks;
@@ -98,6 +100,7 @@ TEST_CASE("memory of cells that ranks share out is announced within a quarter of
 }
 
 TEST_CASE("what a cell takes of a run's memory stays below its bound") {
+  if (!host_memory()) return;
   const auto folder = fresh_folder("memory_of_a_cell");
   constexpr int across = 4, layers = 4, cells = across * across * layers;
   const auto taken = [&](int count) {  // red cells in layers, of which there is room for all

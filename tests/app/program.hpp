@@ -13,7 +13,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <vector>
+
+#include "common/types.hpp"
 
 #ifdef CORPUSCLE_HDF5
 #include <hdf5.h>
@@ -22,6 +25,20 @@
 namespace app {
 
 namespace fs = std::filesystem;
+
+/// Whether the program has threads on the host, as builds for a device may not.
+#ifdef KOKKOS_ENABLE_OPENMP
+constexpr bool host_threads = true;
+#else
+constexpr bool host_threads = false;
+#endif
+
+/// Whether all that the program takes is memory of its process. A device's is not, and what its driver takes is no figure of ours.
+inline bool host_memory() {
+  constexpr bool yes = std::is_same_v<corpuscle::Memory, Kokkos::HostSpace>;
+  if (!yes) WARN("skipped: memory is not this process's alone");
+  return yes;
+}
 
 /// Path of a case file.
 inline std::string scene(const std::string& name) { return CORPUSCLE_SOURCE_DIR "/cases/" + name + ".toml"; }

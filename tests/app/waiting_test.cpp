@@ -8,6 +8,8 @@
 using namespace app;
 using Catch::Contains;
 
+#ifdef KOKKOS_ENABLE_OPENMP
+
 namespace {
 
 /// As a user starts the program, who has said nothing about waiting.
@@ -113,3 +115,7 @@ TEST_CASE("beside a busy process two threads are not much slower than one") {
   // Two threads that spin until the other comes take 5 to 10 times as long as one here, on two cores.
   CHECK(two < 3 * one);
 }
+
+#else
+TEST_CASE("how threads wait") { WARN("skipped: this build has no threads on the host"); }
+#endif

@@ -26,9 +26,12 @@ inline SurfaceSet cells_of(const std::vector<TriangleMesh>& meshes) {
   return set;
 }
 
+/// A copy that later changes do not reach, as a mirror on the host would let them.
 template <class View>
 auto on_host(const View& view) {
-  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
+  auto copy = Kokkos::create_mirror(view);
+  Kokkos::deep_copy(copy, view);
+  return copy;
 }
 
 /// x = move(body, x) at every vertex.

@@ -77,7 +77,8 @@ TEST_CASE("a sink of volume in a closed box is named as the cause, and how large
   FluidSolver solver(grid, {}, sides({Type::wall, Type::wall, Type::wall, Type::wall, Type::wall, Type::wall}));
   // Two neighbouring nodes of a body that shrinks: each moves towards the other.
   const int a = grid.index().cell(3, 4, 4), b = grid.index().cell(4, 4, 4);
-  const auto kind = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid.views().base_kind);
+  const auto kind = Kokkos::create_mirror(grid.views().base_kind);
+  Kokkos::deep_copy(kind, grid.views().base_kind);
   kind(a) = kind(b) = NodeKind::immersed;
   Array<NodeKind> marked("corpuscle::test::kind", grid.index().size());
   Kokkos::deep_copy(marked, kind);

@@ -249,14 +249,16 @@ std::unique_ptr<Cycles> make_cycles(const Comm& comm, const std::array<int, 3>& 
 
 /// Largest difference of this rank's values from those of the whole grid, over the largest of these.
 template <class Value>
-double difference(const IndexSpace& part, const IndexSpace& whole, const Value& mine, const Value& all) {
+double difference(const IndexSpace& part, const IndexSpace& whole, const Value& of_rank, const Value& of_grid) {
+  const auto mine = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), of_rank);
+  const auto all = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), of_grid);
   double most = 0, size = 1e-30;
   for (int k = 0; k < part.n[2]; ++k)
     for (int j = 0; j < part.n[1]; ++j)
       for (int i = 0; i < part.n[0]; ++i) {
         const int c = whole.cell(part.first[0] + i, part.first[1] + j, part.first[2] + k);
-        most = larger(most, std::abs(double(mine.data()[part.cell(i, j, k)]) - all.data()[c]));
-        size = larger(size, std::abs(double(all.data()[c])));
+        most = larger(most, std::abs(double(mine(part.cell(i, j, k))) - all(c)));
+        size = larger(size, std::abs(double(all(c))));
       }
   return most / size;
 }

@@ -11,6 +11,14 @@ using namespace corpuscle::fluid_test;
 
 namespace {
 
+/// One in eleven owned cells becomes immersed.
+void mark_bodies(const IndexSpace& index, const Array<NodeKind>& kind) {
+  for_owned(
+      "corpuscle::test::bodies", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        if ((3 * i + 5 * j + 7 * k) % 11 == 0) kind(index.cell(i, j, k)) = NodeKind::immersed;
+      });
+}
+
 /// A grid with everything the pressure rows are made from. Some cells are marked as bodies, one side as an outflow.
 struct Scene {
   Grid grid;
@@ -35,13 +43,7 @@ struct Scene {
     Kokkos::deep_copy(kind, grid.views().base_kind);
     outflow = PressureMask("corpuscle::test::outflow", n);
     mask = PressureMask("corpuscle::test::mask", n);
-    if (with_bodies) {
-      const auto k_view = kind;
-      for_owned(
-          "corpuscle::test::bodies", index, KOKKOS_LAMBDA(int i, int j, int k) {
-            if ((3 * i + 5 * j + 7 * k) % 11 == 0) k_view(index.cell(i, j, k)) = NodeKind::immersed;
-          });
-    }
+    if (with_bodies) mark_bodies(index, kind);
     if (with_outflow) mark_box(index, {{0, 0, index.n[2]}, {index.n[0], index.n[1], index.n[2] + 1}}, outflow);
     mark_pressure(kind, outflow, mask);
   }

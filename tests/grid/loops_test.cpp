@@ -52,10 +52,11 @@ TEST_CASE("sums over owned cells count each cell once", "[grid]") {
   const std::array<int, 3> n = GENERATE(std::array{7, 5, 3}, std::array{3, 5, 7}, std::array{1, 1, 4}, std::array{19, 17, 13});
   const IndexSpace index = block(n);
   const double expected = sum_of_marks(index);
-  CHECK(sum_owned("corpuscle::test::sum", index, KOKKOS_LAMBDA(int i, int j, int k) { return mark(i, j, k); }) == expected);
+  const double sum = sum_owned("corpuscle::test::sum", index, KOKKOS_LAMBDA(int i, int j, int k) { return mark(i, j, k); });
+  CHECK(sum == expected);
   double reduced = 0;
   reduce_owned("corpuscle::test::reduce", index,
-               KOKKOS_LAMBDA(int i, int j, int k, double& sum) { sum += mark(i, j, k); }, Kokkos::Sum<double>(reduced));
+               KOKKOS_LAMBDA(int i, int j, int k, double& total) { total += mark(i, j, k); }, Kokkos::Sum<double>(reduced));
   CHECK(reduced == expected);
 }
 

@@ -3,6 +3,7 @@
 
 #include <Kokkos_Core.hpp>
 
+#include <cstring>
 #include <map>
 #include <string>
 
@@ -39,7 +40,7 @@ class Recorder {
     return counts;
   }
 
-  /// Bytes allocated by view label.
+  /// Bytes of the memory that kernels use, by view label: not those of copies that the host reads.
   static std::map<std::string, int>& bytes() {
     static std::map<std::string, int> counts;
     return counts;
@@ -55,9 +56,9 @@ class Recorder {
 
  private:
   static void launch(const char* label, std::uint32_t, std::uint64_t*) { ++kernels()[label]; }
-  static void allocate(Kokkos::Tools::SpaceHandle, const char* label, const void*, std::uint64_t size) {
+  static void allocate(Kokkos::Tools::SpaceHandle space, const char* label, const void*, std::uint64_t size) {
     ++allocations()[label];
-    bytes()[label] += static_cast<int>(size);
+    if (std::strcmp(space.name, Kokkos::DefaultExecutionSpace::memory_space::name()) == 0) bytes()[label] += static_cast<int>(size);
   }
 };
 
