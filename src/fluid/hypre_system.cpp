@@ -1,5 +1,7 @@
 #include "fluid/hypre_system.hpp"
 
+#include "fluid/hypre_stream.hpp"
+
 #include <HYPRE.h>
 
 #if (defined(KOKKOS_ENABLE_CUDA) && !defined(HYPRE_USING_CUDA)) || \
@@ -98,6 +100,7 @@ void HypreSystem::set_values() {
   HYPRE_IJMatrixSetValues(ij_matrix_, rows_, row_length_.data(), row_.data(), column_.data(), packed_.data());
   HYPRE_IJMatrixAssemble(ij_matrix_);
   HYPRE_IJMatrixGetObject(ij_matrix_, reinterpret_cast<void**>(&a_));
+  wait_for_hypre();
   errors_.check(HypreErrors::matrix);
 }
 
@@ -109,11 +112,13 @@ void HypreSystem::load(const Array<double>& rhs, const Array<double>& x) {
   HYPRE_IJVectorInitialize(ij_x_);
   HYPRE_IJVectorSetValues(ij_x_, rows_, row_.data(), x.data());
   HYPRE_IJVectorAssemble(ij_x_);
+  wait_for_hypre();
   errors_.check(HypreErrors::vectors);
 }
 
 void HypreSystem::read(const Array<double>& x) {
   HYPRE_IJVectorGetValues(ij_x_, rows_, row_.data(), x.data());
+  wait_for_hypre();
   errors_.check(HypreErrors::vectors);
 }
 

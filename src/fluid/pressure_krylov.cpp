@@ -1,5 +1,7 @@
 #include "fluid/pressure_krylov.hpp"
 
+#include "fluid/hypre_stream.hpp"
+
 #include <HYPRE_krylov.h>
 #include <HYPRE_parcsr_ls.h>
 #include <_hypre_parcsr_mv.h>
@@ -17,6 +19,7 @@ HYPRE_Int keep_preconditioner(HYPRE_Solver, HYPRE_ParCSRMatrix, HYPRE_ParVector,
 
 /// hypre's vectors as views, for a preconditioner of ours; `solver` is the function.
 HYPRE_Int call_preconditioner(HYPRE_Solver solver, HYPRE_ParCSRMatrix, HYPRE_ParVector b, HYPRE_ParVector x) {
+  wait_for_hypre();
   const auto view = [](HYPRE_ParVector vector) {
     auto* local = hypre_ParVectorLocalVector(reinterpret_cast<hypre_ParVector*>(vector));
     return Array<double>(hypre_VectorData(local), hypre_VectorSize(local));
