@@ -338,12 +338,25 @@ constexpr double viscous_tolerance = 1e-8;  // far below the truncation error of
 // A cell of n vertices has 3 n unknowns; more iterations mean a matrix that is no longer positive definite (not a number somewhere).
 constexpr int viscous_iterations = 5000;
 
+/// Teams for whole cells: on a device there are few cells for many processors, and a cell has work for more threads than Kokkos gives
+/// a team by itself.
+template <class Solve>
+Kokkos::TeamPolicy<Exec> large_teams(int teams, [[maybe_unused]] const Solve& solve) {
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  constexpr int enough = 512;
+  const int most = Kokkos::TeamPolicy<Exec>(teams, 1).team_size_max(solve, Kokkos::ParallelForTag());
+  return Kokkos::TeamPolicy<Exec>(teams, most < enough ? most : enough);
+#else
+  return Kokkos::TeamPolicy<Exec>(teams, Kokkos::AUTO);
+#endif
+}
+
 /// Solve for `solution`, which holds the first guess.
 template <class Damping>
 void solve_viscous(const MembraneViews& m, const ViscosityViews& w, const Components<double>& right_side,
                    const Components<double>& solution) {
-  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
-                       ViscousSolve<Damping>({m, w}, right_side, solution, viscous_tolerance, viscous_iterations));
+  const ViscousSolve<Damping> solve({m, w}, right_side, solution, viscous_tolerance, viscous_iterations);
+  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", large_teams(m.cells, solve), solve);
 }
 
 /// The velocity and the answer to a uniform pressure, both with the full left-hand side.
@@ -375,8 +388,8 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
 /// such a pressure with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
 template <class Damping>
 void solve_held(const MembraneViews& m, const ViscosityViews& w) {
-  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(m.cells, Kokkos::AUTO),
-                       HeldViscousSolve<Damping>({m, w}, viscous_tolerance, viscous_iterations));
+  const HeldViscousSolve<Damping> solve({m, w}, viscous_tolerance, viscous_iterations);
+  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", large_teams(m.cells, solve), solve);
 }
 
 /// damping = D v, which is taken off m.force and, if it is another array, off `force`.

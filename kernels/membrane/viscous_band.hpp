@@ -94,19 +94,23 @@ struct BandedViscousSolve {
         }
         team.team_barrier();
       }
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+      const int side = rows - 3;  // threads beside each other have neighbouring rows of a column
+      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, side * side), [&](int n) {
+        const int i = 3 + n / side, k = 3 + n % side;
+        if (k >= i) cell.column[(3 * p + i) * stride + k - i] -= a[i] * a[k] + b[i] * b[k] + c[i] * c[k];
+      });
+#else
       Kokkos::parallel_for(Kokkos::TeamThreadRange(team, 3, rows), [&](int i) {
         double* const trailing = cell.column + (3 * p + i) * stride - i;
         const double of_a = a[i], of_b = b[i], of_c = c[i];
         const auto subtract = [=](int k) { trailing[k] -= of_a * a[k] + of_b * b[k] + of_c * c[k]; };
-#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
-        Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, i, rows), subtract);
-#else
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC ivdep
 #endif
         for (int k = i; k < rows; ++k) subtract(k);
-#endif
       });
+#endif
       team.team_barrier();
     }
     return definite;
@@ -187,8 +191,8 @@ struct BandedViscousSolve {
 /// As solve_held().
 template <class Damping>
 void solve_held(const MembraneViews& m, const ViscosityViews& w, const ViscousBand& band) {
-  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", Kokkos::TeamPolicy<Exec>(band.teams, Kokkos::AUTO),
-                       BandedViscousSolve<Damping>{m, w, band});
+  const BandedViscousSolve<Damping> solve{m, w, band};
+  Kokkos::parallel_for("corpuscle::membrane::viscous_solve", large_teams(band.teams, solve), solve);
 }
 
 }  // namespace corpuscle

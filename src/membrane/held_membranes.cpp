@@ -51,6 +51,7 @@ void MembraneViscosity::hold(const MembraneViews& m) {
   extend(past_, "past_vertex", m.vertices);
   extend(taken_, "taken_vertex", m.vertices);
   grow(views_.iterations, "iterations_cell", m.cells);
+  Kokkos::deep_copy(views_.iterations, 0);
 }
 
 Membranes::Membranes(const std::vector<CellReference>& types, std::shared_ptr<Workspace> workspace)

@@ -25,8 +25,9 @@ std::size_t MembraneViscosity::scratch_numbers(const MembraneViews& m) const {
 /// A cell of n vertices takes about n^2 operations in a factorisation, and about as many in conjugate gradients, which take four times
 /// as long for 642 vertices; beyond some 2500 the band takes too much memory.
 void MembraneViscosity::prepare(const std::vector<CellReference>& types) {
-  constexpr double most_mb = 16, most_together_mb = 64;  // of the matrices at hand
-  constexpr int most_teams = 128;
+  constexpr bool on_host = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
+  constexpr double most_mb = 16, most_together_mb = on_host ? 64 : 512;  // of the matrices at hand
+  constexpr int most_teams = on_host ? 128 : 512;
   std::vector<int> first, place;
   std::size_t vertices = 0;
   for (const CellReference& type : types) {
