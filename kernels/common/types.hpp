@@ -49,7 +49,14 @@ class HostCopy {
   HostMirror<View> host_;
 };
 
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+/// What a loop holds goes along with its launch, up to 4 kB. Kokkos would put more than 512 bytes into constant memory, of which
+/// there is one: each launch would wait until the one before has ended.
+using WithLaunch = Kokkos::Experimental::WorkItemProperty::HintLightWeight_t;
+using Policy = Kokkos::RangePolicy<Exec, WithLaunch>;
+#else
 using Policy = Kokkos::RangePolicy<Exec>;
+#endif
 
 /// Uninitialised labelled allocation; every view in the program carries a label "corpuscle::module::name".
 inline auto uninitialised(const std::string& label) {

@@ -139,7 +139,7 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
   if (upper[0] <= lower[0] || upper[1] <= lower[1] || upper[2] <= lower[2]) return;
 #if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
   using Range = Kokkos::MDRangePolicy<Exec, Kokkos::Rank<3, Kokkos::Iterate::Left, Kokkos::Iterate::Left>,
-                                      Kokkos::IndexType<int>>;
+                                      Kokkos::IndexType<int>, WithLaunch>;
   Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
 #else
   // One iteration a thread: what a line costs beside its cells is soon as much as the cells of a short one.
