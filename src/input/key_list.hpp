@@ -4,9 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "input/section.hpp"
-
 namespace corpuscle {
+
+/// A key with its default and what is allowed.
+struct KeyRecord {
+  std::string key, allowed;
+  std::string value;     // the default as TOML, "" if the key is required
+  bool optional = false; // without a default: may be left out
+  std::string only;      // where the key has no meaning: why, as the message there says
+};
 
 struct SectionRecord {
   std::string name;   // "boundary"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "input/case.hpp"
+#include "input/key_list.hpp"
 
 namespace corpuscle {
 
@@ -33,13 +34,7 @@ Bounds positive(double high = 1e300);
 Bounds not_negative(double high = 1e300);
 Bounds between(double low, double high);
 
-/// What a reader asks of a section, gathered while it reads an empty one: each key with its default and what is allowed.
-struct KeyRecord {
-  std::string key, allowed;
-  std::string value;     // the default as TOML, "" if the key is required
-  bool optional = false; // without a default: may be left out
-  std::string only;      // where the key has no meaning: why, as the message there says
-};
+/// What a reader asks of a section, gathered while it reads an empty one.
 struct KeyRecorder {
   std::map<std::string, std::size_t> chosen;                 // which word the reader is to find for each choice
   std::map<std::string, std::vector<std::string>> choices;   // those it has asked for, with their words
