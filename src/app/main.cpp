@@ -1,6 +1,7 @@
 // corpuscle: the command line.
 #include "app/run.hpp"
 #include "app/waiting.hpp"
+#include "core/device_layout.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "core/nearest.hpp"
@@ -178,6 +179,7 @@ bool can_stay_alone(Command& command) {
 
 int execute(const Comm& comm, const Command& command) {
   return run_command(comm, [&]() -> int {
+    check_device_layout();
     switch (command.kind) {
       case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
       case Command::Kind::check: check_case(comm, command.options); break;
