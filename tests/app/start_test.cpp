@@ -78,7 +78,8 @@ TEST_CASE("warnings name the type of the cell whose area has drifted") {
     std::ofstream(folder / (name + ".toml")) << text.str();
     succeed(folder, with({"run", name + ".toml", "--out", name},
                          both({"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=4", "output.fields=false"}, overrides)));
-    for (const auto& w : report(folder / name)["warnings"])
+    const auto warnings = report(folder / name)["warnings"];
+    for (const auto& w : warnings)
       if (w["figure"] == "area_drift") return w["key"].template get<std::string>();
     return std::string();
   };
