@@ -12,7 +12,8 @@ namespace corpuscle {
 /// square of (n . g_d)^2 / h_n^2 to `coefficient`. Measured on plates at several angles, with spacings of up to 3 to 1, to 0.01 h (four-point: 0.03 h).
 /// Between fluids of viscosities mu and r mu it is their mean that resists, and less is missing, by `layered` times (r - 1)^2 / r, once
 /// the kink of the velocity is taken off (kink.hpp). That and `kink` are measured on a plane across one direction of the grid, as means over
-/// where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50.
+/// where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50. Below none, where slip_between()
+/// ends, what it lacks is left over: 0.010 h of force per area over the outer viscosity for r = 5, 0.074 h for 50, 0.048 h for 1/5, 0.42 h for 1/10.
 struct SlipLaw {
   double coefficient, oblique, layered, kink;
 };

@@ -69,11 +69,15 @@ void BodyHistory::watch_cells(const std::vector<CellDiagnostics>& cells) {
     const int cell = static_cast<int>(c);
     // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
     if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
-    drifts_.area = larger(drifts_.area, std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1));
+    const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
+    if (area > drifts_.area) drifts_.widest = membranes.number(cell);
+    drifts_.area = larger(drifts_.area, area);
   }
   if (!simulation_.shared_cells()) return;
+  const Comm& comm = simulation_.grid().comm();
   double drifts[2] = {drifts_.volume, drifts_.area};
-  simulation_.grid().comm().max(drifts, 2);
+  comm.max(drifts, 2);
+  drifts_.widest = static_cast<int>(comm.max(drifts_.area == drifts[1] ? drifts_.widest : -1.0));
   drifts_.volume = drifts[0], drifts_.area = drifts[1];
 }
 

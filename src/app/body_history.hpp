@@ -29,6 +29,7 @@ struct CellFigures {
 /// The largest relative changes of cells' volumes and areas that any sample has met.
 struct CellDrifts {
   double volume = 0, area = 0;
+  int widest = 0;  // number of the cell whose area it is
 };
 
 class BodyHistory {

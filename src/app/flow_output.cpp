@@ -142,6 +142,7 @@ void FlowOutput::after_step(bool start) {
 void FlowOutput::measure_bodies() {
   history_->measure();
   totals_.volume_drift = larger(totals_.volume_drift, history_->drifts().volume);
+  if (history_->drifts().area > totals_.area_drift) totals_.widest = history_->drifts().widest;
   totals_.area_drift = larger(totals_.area_drift, history_->drifts().area);
 }
 
@@ -263,7 +264,7 @@ RunTotals FlowOutput::totals_now(bool together) {
   return now;
 }
 
-FlowRecord FlowOutput::record() const { return {scene_, simulation_, energy_, history_.get()}; }
+FlowRecord FlowOutput::record() const { return {scene_, simulation_, energy_, history_.get(), totals_.widest}; }
 
 void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   if (end_sample_) now.add(*end_sample_);

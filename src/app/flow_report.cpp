@@ -4,6 +4,7 @@
 #include "app/reference_flows.hpp"
 #include "core/units.hpp"
 #include "fluid/flow_balances.hpp"
+#include "immersed/surface.hpp"
 
 #include <fmt/format.h>
 
@@ -24,7 +25,7 @@ double poor_share(const std::vector<long>& fits) {
 }
 
 void report_energy(const FlowRecord& record, Report& report) {
-  const auto& [scene, simulation, energy, history] = record;
+  const auto& [scene, simulation, energy, history, widest] = record;
   if (const auto whole = energy.imbalance()) report.errors["energy_balance"] = *whole;
   const auto& t = energy.totals();
   auto& terms = report.extra["energy_fJ"];
@@ -42,7 +43,7 @@ void report_energy(const FlowRecord& record, Report& report) {
 }
 
 void report_quantities(const FlowRecord& record, Report& report) {
-  const auto& [scene, simulation, energy, history] = record;
+  const auto& [scene, simulation, energy, history, widest] = record;
   auto& all = report.quantities;
   const char* axes[] = {"x", "y", "z"};
   static const std::vector<HistorySample> none;
@@ -102,10 +103,18 @@ void report_contact(FlowSimulation& simulation, const RunTotals& now, Report& re
     report.extra["contact"][name] = gap < 1e30 ? nlohmann::json(gap) : nlohmann::json();
 }
 
-/// Where cells have types, their constants are keys of those.
-void name_types(const Case& scene, nlohmann::json& warnings) {
-  if (scene.cell_types.empty()) return;
-  const std::string named = "cells.0.", right = "cell_types.0.";
+/// The section that the constants of a cell are in: of [[cells]], of a population's type.
+std::string section_of(const Case& scene, const CellNames* names, int number) {
+  int type = -1, beyond = number - static_cast<int>(scene.cells.size());
+  if (beyond < 0) type = scene.cells[number].type;
+  for (std::size_t p = 0; names && beyond >= 0 && p < names->count.size(); beyond -= names->count[p++]) type = scene.populations[p].type;
+  return type < 0 ? fmt::format("cells.{}.", number) : fmt::format("cell_types.{}.", type);
+}
+
+/// What is said of the first cell is of the one whose area has drifted most, or of its type.
+void name_cell(const Case& scene, const CellNames* names, int number, nlohmann::json& warnings) {
+  const std::string named = "cells.0.", right = section_of(scene, names, number);
+  if (right == named) return;
   for (auto& warning : warnings)
     for (const char* entry : {"key", "message"}) {
       std::string text = warning[entry];
@@ -118,7 +127,7 @@ void name_types(const Case& scene, nlohmann::json& warnings) {
 }  // namespace
 
 void report_totals(const FlowRecord& record, const RunTotals& now, Report& report) {
-  const auto& [scene, simulation, energy, history] = record;
+  const auto& [scene, simulation, energy, history, widest] = record;
   auto& errors = report.errors;
   errors["max_divergence"] = now.divergence;
   errors["flux_correction"] = now.flux_correction;
@@ -153,11 +162,12 @@ void judge_figures(const FlowRecord& record, Report& report) {
   report.warnings = judge(report.errors, {record.simulation.fluid().statistics().reference_speed, record.energy.largest_fJ(),
                                           record.scene.fluid->convection == FluidSettings::Convection::none, false,
                                           record.simulation.shared_cells() != nullptr});
-  name_types(record.scene, report.warnings);
+  const SurfaceSet* surfaces = record.simulation.surfaces();
+  name_cell(record.scene, surfaces ? surfaces->names : nullptr, record.widest, report.warnings);
 }
 
 void report_state(const FlowRecord& record, Report& report) {
-  const auto& [scene, simulation, energy, history] = record;
+  const auto& [scene, simulation, energy, history, widest] = record;
   auto& errors = report.errors;
   errors["convection_over_viscosity"] = convection_over_viscosity(simulation.fluid());
   if (simulation.immersed()) {

@@ -14,6 +14,7 @@ struct FlowRecord {
   FlowSimulation& simulation;
   const EnergyBalance& energy;
   const BodyHistory* history;  // null without bodies
+  int widest;                  // RunTotals::widest
 };
 
 /// Errors, iterations, counts and times, as far as they were counted on the way.

@@ -39,13 +39,19 @@ void RunTotals::add(const FlowSample& sample) {
   slip_speed = larger(slip_speed, sample.slip_speed);
 }
 
-std::string to_text(const RunTotals& totals) { return nlohmann::json(totals).dump(); }
+std::string to_text(const RunTotals& totals) {
+  nlohmann::json json(totals);
+  json["widest"] = totals.widest;
+  return json.dump();
+}
 
 RunTotals totals_from(const std::string& text) {
   try {
     auto json = nlohmann::json::parse(text);
     read_nulls(json);
-    return json.get<RunTotals>();
+    auto totals = json.get<RunTotals>();
+    totals.widest = json.value("widest", 0);  // earlier checkpoints do not have it
+    return totals;
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("'totals' is damaged: {}", error.what()));
   }

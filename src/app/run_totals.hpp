@@ -17,6 +17,7 @@ struct FlowSample {
 struct RunTotals {
   Tally momentum, pressure, projections, coupling, substeps, residual;
   double divergence = 0, flux_correction = 0, volume_drift = 0, area_drift = 0;
+  int widest = 0;                                                      // number of the cell whose area has drifted most
   double splitting_us = 0, splitting_until_us = 0, splitting_max = 0;  // integral over time until then, from the sampled steps
   double speed = 0;                                                    // um/us, the largest at a node so far
   double slip_speed = 0;                                               // um/us, the largest of the sampled steps

@@ -321,7 +321,8 @@ double ForceCoupling::power_on_sides() {
 }
 
 double ForceCoupling::power_on_sides(const Components<double>& of_sides) {
-  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), of_sides));
+  const SlipViews slip = slip_of_membranes();
+  return fluid_.grid().comm().sum(transfer_->power_on_sides(forces(), of_sides, scene_.coupling->slip ? &slip : nullptr));
 }
 
 const Components<double>& ForceCoupling::tractions_for_output() {

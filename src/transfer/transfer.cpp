@@ -272,13 +272,13 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
   const auto& through = sharp ? const_fluxes(sharp_flux_) : flux;
   with_kernel([&](auto delta) {
     interpolate_velocity<decltype(delta)>(block_, through, u, markers_, velocity);
-    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, through, markers_, velocity);
+    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, through, u, markers_, velocity);
   });
   if (slip) add_slip(block_, *slip, markers_, velocity);
 }
 
 /// What vertices have of the sides' velocities is what they have where all fluxes are zero.
-double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u) {
+double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u, const SlipViews* slip) {
   weighed_ = false;
   const std::size_t vertices = places_.vertices;
   const Components<double> of_sides(weigh(3 * vertices), vertices, 3);
@@ -290,7 +290,10 @@ double Transfer::power_on_sides(const Components<double>& force, const Component
   }
   Kokkos::deep_copy(of_sides, 0.0);
   const auto& through = const_fluxes(sharp ? sharp_flux_ : raw_);
-  with_kernel([&](auto delta) { interpolate_velocity<decltype(delta)>(block_, through, u, markers_, of_sides); });
+  with_kernel([&](auto delta) {
+    interpolate_velocity<decltype(delta)>(block_, through, u, markers_, of_sides);
+    if (slip && !ratios_.empty()) add_kinks<decltype(delta)>(block_, *slip, through, u, markers_, of_sides);
+  });
   return power_of(places_.vertices, force, of_sides);
 }
 

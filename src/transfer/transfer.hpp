@@ -47,8 +47,8 @@ class Transfer {
   void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                    const Components<double>& velocity);
   /// Power that forces [vertex, 3] give to sides that move: the part of a kernel that is folded back pushes the side itself. This
-  /// rank's part, nW. Finds all weights anew: for reports.
-  double power_on_sides(const Components<double>& force, const Components<double>& u);
+  /// rank's part, nW. Finds all weights anew: for reports. @param slip  as for spread()
+  double power_on_sides(const Components<double>& force, const Components<double>& u, const SlipViews* slip = nullptr);
   /// What the slip of a membrane depends on, with this kernel's law.
   /// @param type  [body] as for slip_between(); without values there is but one fluid
   /// @param gap  [vertex] um to the nearest other surface; without values nothing is near

@@ -69,3 +69,20 @@ TEST_CASE("warnings name the keys of types where cells have types") {
   CHECK((*found)["key"] == "cell_types.0.area_modulus_uN_per_m");
   CHECK_THAT((*found)["message"].template get<std::string>(), Contains("cell_types.0.area_modulus") && !Contains("cells.0."));
 }
+
+TEST_CASE("warnings name the type of the cell whose area has drifted") {
+  const auto folder = fresh_folder("drifted_types");
+  std::stringstream text;
+  text << std::ifstream(scene("two_cells")).rdbuf() << "\n[[cell_types]]\nname = \"other\"\nvertices = 300\nshear_modulus_uN_per_m = 5\n";
+  const auto key = [&](const std::string& name, const Words& overrides) {
+    std::ofstream(folder / (name + ".toml")) << text.str();
+    succeed(folder, with({"run", name + ".toml", "--out", name},
+                         both({"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=4", "output.fields=false"}, overrides)));
+    const auto warnings = report(folder / name)["warnings"];
+    for (const auto& w : warnings)
+      if (w["figure"] == "area_drift") return w["key"].template get<std::string>();
+    return std::string();
+  };
+  CHECK(key("second", {"cells.1.type=other", "cells.1.start_stretch=[1.5,1,1]"}) == "cell_types.1.area_modulus_uN_per_m");
+  CHECK(key("first", {"cells.1.type=other", "cells.0.start_stretch=[1.5,1,1]"}) == "cell_types.0.area_modulus_uN_per_m");
+}

@@ -154,6 +154,17 @@ TEST_CASE("cells cross ranks and periodic sides, and nothing shows that they do"
   CHECK(largest_difference(one.x, shared.x) < 1e-8);  // um; round-off, and residuals of the solvers at 1e-13
 }
 
+TEST_CASE("cells of other viscosities beside each other move the same on any number of ranks", "[coupling][cells][ranks]") {
+  // As near as they are their kinks are left, by half: a cell's copies elsewhere must know so too.
+  if (Comm().size() == 1) return;
+  Case scene = touching_capsules(60);
+  for (std::size_t n = 0; n < scene.cells.size(); ++n) scene.cells[n].viscosity_ratio = n % 2 == 0 ? 5 : 0.5;
+  for (std::size_t n = 5; n < scene.cells.size(); ++n) scene.cells[n].radius_um = 0.6;
+  const double off = largest_difference(run(Comm::alone(), scene).x, run(Comm(), scene).x);
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("differ by {:.2e} um", off));
+  CHECK(off < 1e-8);  // um; round-off, and residuals of the solvers at 1e-13
+}
+
 TEST_CASE("in a tube slip is held where strain stiffens, on any number of ranks alike", "[coupling][cells][ranks]") {
   // Two kinds of capsules drawn out to 1.3 times their length, in steps that leave no room for stiffer ones than at rest.
   Case scene;

@@ -6,6 +6,7 @@
 
 #include "cells/rank_blocks.hpp"
 #include "fields.hpp"
+#include "transfer/kink.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::transfer_test;
@@ -31,18 +32,27 @@ struct Points {
     set.vertex_body = Array<int>("corpuscle::test::body", count);
     Kokkos::deep_copy(set.area, 0.01);
   }
-  SlipViews slip(const Transfer& transfer) const { return transfer.slip(set, force, 1, type); }
+  SlipViews slip(const Transfer& transfer) const { return transfer.slip(set, force, 1, type, gap); }
 
   SurfaceSet set;
   Components<double> force;
   Array<int> type;
+  Array<double> gap;  // um, if any
 };
 
-Points random_points(int count, double edge, bool warped) {
+/// @param shifts  of the images of each
+Points random_points(int count, double edge, bool warped, const std::vector<Vec3>& shifts = {Vec3{}}) {
   Noise noise;
-  const auto any = [&](int) { return Triple{noise(-1, 1), noise(-1, 1), noise(-1, 1)}; };
-  const auto force = points(count, any);
-  return Points(inside(count, edge, warped), force, any);
+  std::vector<Triple> force, normal;
+  for (auto* of : {&force, &normal})
+    for (int i = 0; i < count; ++i) of->push_back({noise(-1, 1), noise(-1, 1), noise(-1, 1)});
+  const auto one = on_host(inside(count, edge, warped));
+  const int all = count * static_cast<int>(shifts.size());
+  const auto at = [&](int i) {
+    const Vec3 x = load(one, i % count) + shifts[i / count];
+    return Triple{x.x, x.y, x.z};
+  };
+  return Points(points(all, at), points(all, [&](int i) { return force[i % count]; }), [&](int i) { return normal[i % count]; });
 }
 
 Components<double> velocity_of(Transfer& transfer, const Field& field, const Points& p, bool with) {
@@ -55,18 +65,24 @@ Components<double> velocity_of(Transfer& transfer, const Field& field, const Poi
 }  // namespace
 
 TEST_CASE("forces go the way back that velocities lose their kink", "[transfer][ranks]") {
-  // On a grid without two parallel faces, up to its walls: as without the kink, to round-off.
+  // On a grid without two parallel faces, up to sides of every kind, or closed upon itself: as without the kink, to round-off.
+  struct Setting {
+    std::array<Type, 6> types;
+    bool periodic;
+  };
+  const auto s = GENERATE(Setting{walls, false},
+                          Setting{{Type::symmetry, Type::moving_wall, Type::velocity_inlet, Type::outflow, Type::symmetry, Type::symmetry}, false},
+                          Setting{{Type::periodic, Type::periodic, Type::moving_wall, Type::symmetry, Type::periodic, Type::periodic}, true});
   const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
   const Comm comm;
-  Grid grid(comm, warped_box({12, 11, 13}), {false, false, false});
-  const Points p = random_points(300, 0.02, true);
-  Transfer transfer(grid, sides(walls), kernel, p.set.vertices);
+  Grid grid(comm, s.periodic ? sheared_box({12, 11, 13}) : warped_box({12, 11, 13}), {s.periodic, false, s.periodic});
+  const Points p = random_points(300, 0.02, !s.periodic, s.periodic ? period_shifts(grid) : std::vector{Vec3{}});
+  Transfer transfer(grid, sides(s.types), kernel, p.set.vertices);
   transfer.slip_between({ratio});
   REQUIRE(transfer.place(p.set.x) == -1);
   const SlipViews slip = p.slip(transfer);
   transfer.spread(p.force, &slip);
-  Field field = make_field(grid, rough);
-  Kokkos::deep_copy(field.u, 0.0);
+  const Field field = make_field(grid, rough);
   const auto f = on_host(p.force);
   const auto power = [&](bool with) {
     const auto u = sum_of_ranks(velocity_of(transfer, field, p, with));
@@ -78,49 +94,75 @@ TEST_CASE("forces go the way back that velocities lose their kink", "[transfer][
   std::vector<decltype(on_host(field.flux[0]))> flux;
   for (int d = 0; d < 3; ++d) flux.push_back(on_host(field.flux[d]));
   const double at_faces = face_sum(transfer, [&](int d, int c) { return flux[d](c); });
-  CHECK(at_faces == Approx(power(true)).epsilon(1e-11));
+  const double at_sides = comm.sum(transfer.power_on_sides(p.force, field.u, &slip));
+  CHECK(at_faces + at_sides == Approx(power(true)).epsilon(1e-11));
   CHECK(std::abs(power(true) - power(false)) > 0.01 * std::abs(power(false)));
-  for (int m = 0; m < 3; ++m) {  // and the forces' sum is left as it is
-    std::vector<decltype(on_host(grid.views().x))> area;
-    for (int d = 0; d < 3; ++d) area.push_back(on_host(transfer.block().sharp_area[d]));
-    const double with = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
-    transfer.spread(p.force);
-    const double without = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
-    transfer.spread(p.force, &slip);
-    CHECK(with == Approx(without).margin(kernel == Kernel::three_point ? 0.05 : 0.02));
-  }
 }
 
 TEST_CASE("of a velocity only what shears along a membrane between two fluids is taken off", "[transfer][ranks]") {
+  // Up to walls, that all move with it; and near other surfaces, where less of it is.
   const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
   const Comm comm;
-  const auto change = [&](bool curved, const std::function<Triple(const Triple&)>& velocity, const std::function<Vec3(const Vec3&)>& expected) {
-    Grid grid(comm, curved ? warped_box({12, 12, 12}) : sheared_box({12, 12, 12}), {false, false, false});
-    const Points p = random_points(200, 0.3, curved);
+  constexpr int cells = 12;
+  const auto change = [&](bool curved, const std::function<Triple(const Triple&)>& velocity,
+                          const std::function<Vec3(const Vec3&, const Vec3&, double)>& expected) {
+    Grid grid(comm, curved ? warped_box({cells, cells, cells}) : sheared_box({cells, cells, cells}), {false, false, false});
+    Points p = random_points(400, 0.01, curved);
+    p.gap = Array<double>("corpuscle::test::gap", p.set.vertices);
+    const auto gap = Kokkos::create_mirror_view(p.gap);
+    for (int i = 0; i < p.set.vertices; ++i) gap(i) = 0.04 * (i % 13);  // up to 2.3 spacings
+    Kokkos::deep_copy(p.gap, gap);
     Transfer transfer(grid, sides(walls), kernel, p.set.vertices);
     transfer.slip_between({ratio});
     REQUIRE(transfer.place(p.set.x) == -1);
     const Field field = make_field(grid, velocity);
     const auto with = sum_of_ranks(velocity_of(transfer, field, p, true)), without = sum_of_ranks(velocity_of(transfer, field, p, false));
-    const auto normal = on_host(p.set.normal);
+    const auto normal = on_host(p.set.normal), x = on_host(p.set.x);
     double worst = 0;
-    for (int i = 0; i < p.set.vertices; ++i) worst = std::max(worst, norm(load(with, i) - load(without, i) - expected(load(normal, i))));
+    for (int i = 0; i < p.set.vertices; ++i)
+      worst = std::max(worst, norm(load(with, i) - load(without, i) - expected(load(normal, i), load(x, i), gap(i))));
     return worst;
   };
-  const auto nothing = [](const Vec3&) { return Vec3{}; };
+  const auto nothing = [](const Vec3&, const Vec3&, double) { return Vec3{}; };
   const double round_off = comm.size() > 1 && kernel == Kernel::four_point ? 3e-5 : 1e-11;  // of areas beyond halos
   CHECK(change(true, [](const Triple&) { return Triple{0.3, -1, 0.7}; }, nothing) < round_off);
   CHECK(change(false, [](const Triple& p) { return Triple{p[1] - 2 * p[2], 3 * p[2] - p[0], 2 * p[0] - 3 * p[1]}; }, nothing) < round_off);
-  // u = (y, 0, 0): grad u + grad u^T = e_x e_y + e_y e_x; spacings g of the sheared box, of 2 um and 12 cells.
-  const double share = (kernel == Kernel::three_point ? 0.237 : 0.358) * 2 * (ratio - 1) / (ratio + 1) / 6;
-  const auto shear = [&](const Vec3& n) {
-    const Vec3 g[3] = {{1, 0, 0.15}, {0.3, 1, 0}, {0, 0.2, 1}};
-    double square = 0;
-    for (const Vec3& direction : g) square += dot(direction, n) * dot(direction, n);
+  // u = (y, 0, 0): grad u + grad u^T = e_x e_y + e_y e_x; spacings g of the sheared box, of 2 um.
+  const double share = (kernel == Kernel::three_point ? 0.237 : 0.358) * 2 * (ratio - 1) / (ratio + 1);
+  const auto shear = [&](const Vec3& n, const Vec3& x, double gap) {
+    const double size = 2.0 / cells;
+    const Vec3 g[3] = {size * Vec3{1, 0, 0.15}, size * Vec3{0.3, 1, 0}, size * Vec3{0, 0.2, 1}};
+    const DualBasis dual(g[0], g[1], g[2]);
+    double square = 0, left = 1;
+    for (int d = 0; d < 3; ++d) {
+      square += dot(g[d], n) * dot(g[d], n);
+      left *= kink_share_beside(dot(dual.b[d], x)) * kink_share_beside(cells - dot(dual.b[d], x));
+    }
+    const double spacing = std::sqrt(square);
     const Vec3 twice = {n.y, n.x, 0};
-    return (-share * std::sqrt(square)) * (twice - dot(twice, n) * n);
+    return (-share * left * slip_share(gap / spacing) * spacing) * (twice - dot(twice, n) * n);
   };
   CHECK(change(false, [](const Triple& p) { return Triple{p[1], 0, 0}; }, shear) < 1e-10);
+}
+
+TEST_CASE("what is taken off of forces leaves their sum as it is", "[transfer][ranks]") {
+  // Beyond where walls take part, on a grid without two parallel faces.
+  const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
+  const Comm comm;
+  Grid grid(comm, warped_box({12, 11, 13}), {false, false, false});
+  const Points p = random_points(300, 0.25, true);
+  Transfer transfer(grid, sides(walls), kernel, p.set.vertices);
+  transfer.slip_between({ratio});
+  REQUIRE(transfer.place(p.set.x) == -1);
+  const SlipViews slip = p.slip(transfer);
+  std::vector<decltype(on_host(grid.views().x))> area;
+  for (int d = 0; d < 3; ++d) area.push_back(on_host(transfer.block().sharp_area[d]));
+  for (int m = 0; m < 3; ++m) {
+    transfer.spread(p.force, &slip);
+    const double with = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
+    transfer.spread(p.force);
+    CHECK(with == Approx(face_sum(transfer, [&](int d, int c) { return area[d](c, m); })).margin(kernel == Kernel::three_point ? 0.05 : 0.02));
+  }
 }
 
 TEST_CASE("how the grid is cut over ranks does not change what kinks are", "[transfer][ranks]") {
@@ -147,13 +189,15 @@ TEST_CASE("how the grid is cut over ranks does not change what kinks are", "[tra
 
 namespace {
 
-/// A plane across y between walls, the fluid below it `r` times as viscous, where the upper wall moves with `wall` and the plane is
-/// pushed along x with `pull` per area, times viscosity over spacing: how much faster the plane is than it should be.
-double plane_error(double y, double r, double wall, double pull, bool with) {
-  constexpr int n = 4, high = 16, along = 2 * n, count = along * along;
-  auto boundaries = sides({Type::periodic, Type::periodic, Type::wall, Type::moving_wall, Type::periodic, Type::periodic});
+constexpr double high = 16;
+
+/// A plane across y above a wall, the fluid below it `r` times as viscous, where the upper wall moves with `wall` (or there is none to it,
+/// but symmetry) and the plane is pushed along x with `pull` per area, times viscosity over spacing: how much faster the plane is than it should be.
+double plane_error(double y, double r, double wall, double pull, bool with, Type top = Type::moving_wall) {
+  constexpr int n = 4, along = 2 * n, count = along * along;
+  auto boundaries = sides({Type::periodic, Type::periodic, Type::wall, top, Type::periodic, Type::periodic});
   boundaries[3].velocity = Triple{wall, 0, 0};
-  auto box_of = box({n, high, n}, {n, high, n});
+  auto box_of = box({n, static_cast<int>(high), n}, {n, high, n});
   Grid grid(Comm::alone(), make_node_source(box_of), {true, false, true});
   FluidSettings settings;
   settings.convection = FluidSettings::Convection::none;
@@ -193,7 +237,7 @@ double plane_error(double y, double r, double wall, double pull, bool with) {
   const auto v = on_host(velocity);
   double mean = 0;
   for (int i = 0; i < count * copies; ++i) mean += v(i, 0) / count;
-  return mean - (wall / (high - y) + pull) / (1 / (high - y) + r / y);
+  return mean - (top == Type::symmetry ? pull * y / r : (wall / (high - y) + pull) / (1 / (high - y) + r / y));
 }
 
 /// The mean of it over where in a cell the plane is.
@@ -217,4 +261,31 @@ TEST_CASE("a plane between two fluids moves as it should, sheared or pulled", "[
   CHECK(std::abs(with) < 0.01);
   CHECK(std::abs(pulled) < 0.04);  // there is no slip below none, for r = 5
   if (r == 5) CHECK(pulled_before > 0.15);
+}
+
+TEST_CASE("beside a wall a plane between two fluids moves as well as it does amid the channel", "[transfer]") {
+  // Where in a cell the plane lies makes 0.1 h of shear's jump: so by that of a plane as far up in another cell.
+  const double r = GENERATE(0.2, 5.0), mean = 0.5 * (1 + r);
+  const auto sheared = [&](double gap, bool with) { return plane_error(high - gap, r, 1, 0, with) * (gap + (high - gap) / r) / (1 - 1 / r); };
+  const auto pulled = [&](double gap, bool with, Type top) { return plane_error(high - gap, r, 0, 1, with, top) * mean; };
+  for (const double gap : {0.7, 1.2, 1.7, 2.3}) {
+    const double without = sheared(gap, false), with = sheared(gap, true), far = sheared(gap + 4, true);
+    const double pulled_without = pulled(gap, false, walls[3]), pulled_with = pulled(gap, true, walls[3]), pulled_far = pulled(gap + 4, true, walls[3]);
+    const double free_without = pulled(gap, false, Type::symmetry), free_with = pulled(gap, true, Type::symmetry), free_far = pulled(gap + 4, true, Type::symmetry);
+    INFO("r " << r << ", gap " << gap << " h");
+    if (std::getenv("CORPUSCLE_SHOW"))
+      WARN(fmt::format("r {}, gap {} h: sheared {:.3f} ({:.3f} without, {:.3f} far away); pulled {:.3f} ({:.3f}, {:.3f}); beside symmetry {:.3f} ({:.3f}, {:.3f})",
+                       r, gap, with, without, far, pulled_with, pulled_without, pulled_far, free_with, free_without, free_far));
+    if (gap > 1) {
+      CHECK(without > 0.2);
+      CHECK(std::abs(with - far) < 0.005);
+      CHECK(std::abs(pulled_with - pulled_far) < 0.06);  // of up to 0.5
+      CHECK(std::abs(free_with - free_far) < 0.02);
+    } else {  // the wall has taken half of the kink
+      CHECK(without > 0.1);
+      CHECK(std::abs(with) < 0.8 * without);
+      CHECK(std::abs(pulled_with) < std::abs(pulled_without) + 0.05);
+    }
+    CHECK(std::abs(free_with) < 0.5 * std::abs(free_without));
+  }
 }
