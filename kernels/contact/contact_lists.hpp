@@ -95,10 +95,16 @@ inline std::int64_t numbers_to_starts(const std::string& label, const Array<int>
   return total;
 }
 
-/// lists.first, and how many items there are.
-inline std::int64_t count_items(const ContactSearch& search, const ContactLists& lists) {
+/// What lists are made from.
+struct ContactItems {
+  Array<int> first;  // [vertex + 1] into `item`
+  Array<int> item;   // [item] in order
+};
+
+/// items.first, and how many items there are.
+inline std::int64_t count_items(const ContactSearch& search, const ContactItems& items) {
   const ContactSearch s = search;
-  const auto first = lists.first;
+  const auto first = items.first;
   const int vertices = s.surface.vertices;
   Kokkos::parallel_for(
       "corpuscle::contact::count_items", Policy(0, vertices), KOKKOS_LAMBDA(int v) {
@@ -109,10 +115,16 @@ inline std::int64_t count_items(const ContactSearch& search, const ContactLists&
   return numbers_to_starts("corpuscle::contact::first_items", first, vertices);
 }
 
-/// lists.item, in order, and how many groups each vertex has, in first_group.
-inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
+/// Whether an item belongs to the group that begins with `first`.
+KOKKOS_INLINE_FUNCTION bool within_group(const SurfaceSet& s, int first, int item) {
+  return item - first <= ContactLists::farthest && same_group(s, first, item);
+}
+
+/// items.item, in order, and how many groups each vertex has, in lists.first_group.
+inline void fill_items(const ContactSearch& search, const ContactItems& items, const ContactLists& lists) {
   const ContactSearch s = search;
-  const ContactLists out = lists;
+  const ContactItems out = items;
+  const auto first_group = lists.first_group;
   Kokkos::parallel_for(
       "corpuscle::contact::fill_items", Policy(0, s.surface.vertices), KOKKOS_LAMBDA(int v) {
         const int begin = out.first(v);
@@ -123,9 +135,31 @@ inline void fill_items(const ContactSearch& search, const ContactLists& lists) {
           out.item(to) = item;
         });
         int groups = 0;
-        for (int e = begin; e < end; ++e)
-          if (e == begin || !same_group(s.surface, out.item(e - 1), out.item(e))) ++groups;
-        out.first_group(v) = groups;
+        for (int e = begin, first = begin; e < end; ++e)
+          if (e == begin || !within_group(s.surface, out.item(first), out.item(e))) first = e, ++groups;
+        first_group(v) = groups;
+      });
+}
+
+/// lists.first, first_item and beyond. After number_groups().
+inline void pack_items(const SurfaceSet& surface, const ContactItems& items, const ContactLists& lists) {
+  const SurfaceSet s = surface;
+  const ContactItems in = items;
+  const ContactLists out = lists;
+  Kokkos::parallel_for(
+      "corpuscle::contact::pack_items", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
+        const int end = in.first(v + 1);
+        int group = out.first_group(v), first = -1;
+        for (int e = in.first(v); e < end; ++e) {
+          const int item = in.item(e);
+          if (first < 0 || !within_group(s, first, item)) {
+            first = item;
+            out.first(group) = e;
+            out.first_item(group++) = item;
+          }
+          out.beyond(e) = static_cast<std::uint16_t>(item - first);
+        }
+        if (v + 1 == s.vertices) out.first(group) = end;
       });
 }
 

@@ -16,15 +16,20 @@ struct ContactRest {
 
 /// The triangles that are near each vertex, or may come near it before the lists are made anew. Items are triangles
 /// under images: item = image * triangles + triangle; they rise along a vertex' list. A group are the items of one body
-/// under one image.
+/// under one image, as far as 16 bits reach: those of larger bodies may make several groups, one behind the other.
 struct ContactLists {
+  static constexpr int farthest = 65535;  // in a group, from its first item
   int items = 0, groups = 0;
-  Array<int> first;        // [vertex + 1] into `item`
-  Array<int> item;         // [item]
-  Array<int> first_group;  // [vertex + 1] into the contacts
+  Array<int> first_group;       // [vertex + 1] into the contacts
+  Array<int> first;             // [group + 1] into `beyond`
+  Array<int> first_item;        // [group] the lowest
+  Array<std::uint16_t> beyond;  // [item] how far beyond that of its group
+
+  KOKKOS_INLINE_FUNCTION int item(int group, int entry) const { return first_item(group) + beyond(entry); }
 };
 
-/// The nearest point of each group of a vertex; where none is within reach, item is -1.
+/// The nearest point of each group of a vertex, of several groups of the same body and image all in the first; where none is within
+/// reach, item is -1.
 struct ContactViews {
   Array<int> item;       // [group]
   Array<double> gap;     // [group] um; negative where the vertex is on the wrong side

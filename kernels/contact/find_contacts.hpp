@@ -70,25 +70,24 @@ inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts,
   Kokkos::parallel_for(
       "corpuscle::contact::find_contacts", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
         const Vec3 here = load(s.x, v);
-        int g = in.first_group(v);
-        for (int e = in.first(v); e < in.first(v + 1);) {
-          const int first = in.item(e);
+        const int last = in.first_group(v + 1);
+        for (int g = in.first_group(v); g < last;) {
+          const int group = g, first = in.first_item(g);
           const Vec3 p = here + images.shift[item_image(s, first)];
           Nearest best;
-          for (; e < in.first(v + 1) && same_group(s, first, in.item(e)); ++e) {
-            const Corners k = corners(s, item_triangle(s, in.item(e)), {});
-            const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
-            const Vec3 r = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
-            const double square = dot(r, r);
-            if (square < best.square) best = {square, in.item(e), at};
+          for (; g < last && (g == group || same_group(s, first, in.first_item(g))); ++g) {
+            out.item(g) = -1;
+            for (int e = in.first(g); e < in.first(g + 1); ++e) {
+              const Corners k = corners(s, item_triangle(s, in.item(g, e)), {});
+              const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+              const Vec3 r = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
+              const double square = dot(r, r);
+              if (square < best.square) best = {square, in.item(g, e), at};
+            }
           }
           const bool own = same_body(s, v, first);
           const double most = own ? reach.own : reach.other;
-          if (best.square < most * most)
-            store_contact(s, p, own, best, out, g);
-          else
-            out.item(g) = -1;
-          ++g;
+          if (best.square < most * most) store_contact(s, p, own, best, out, group);
         }
       });
 }

@@ -96,9 +96,12 @@ inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image
       "corpuscle::contact::longest_passage", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, LongestWay& sum) {
         const Vec3 velocity = load(s.v, v);
-        for (int e = in.first(v); e < in.first(v + 1); ++e) {
-          if (!counts(s, v, in.item(e), own_vertices)) continue;
-          const int t = item_triangle(s, in.item(e));
+        int g = in.first_group(v);
+        for (int e = in.first(g), end = in.first(in.first_group(v + 1)); e < end; ++e) {
+          while (e == in.first(g + 1)) ++g;
+          const int item = in.item(g, e);
+          if (!counts(s, v, item, own_vertices)) continue;
+          const int t = item_triangle(s, item);
           Vec3 relative[3];
           bool slow = true;
           for (int c = 0; c < 3; ++c) {
@@ -107,7 +110,7 @@ inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image
           }
           if (slow) continue;
           const Corners k = corners(s, t, {});
-          const Vec3 p = load(s.x, v) + images.shift[item_image(s, in.item(e))];
+          const Vec3 p = load(s.x, v) + images.shift[item_image(s, item)];
           const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
           const Vec3 away = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
           const Vec3 way = at.weight[0] * relative[0] + at.weight[1] * relative[1] + at.weight[2] * relative[2];
@@ -116,7 +119,7 @@ inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image
           own.way = distance > 1e-9 ? std::fabs(dot(way, away)) / distance : norm(way);
           if (own.way <= least || own.way <= distance) continue;
           own.vertex = v;
-          own.item = in.item(e);
+          own.item = item;
           sum += own;
         }
       },

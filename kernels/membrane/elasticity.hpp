@@ -1,6 +1,7 @@
 // The kernels of the in-plane laws, behind an interface that does not know which.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -14,7 +15,7 @@ namespace corpuscle {
 class Elasticity {
  public:
   virtual ~Elasticity() = default;
-  /// Forces of each triangle on its corners, into m.corner_force; measure_membranes must have run at the same x. Marks in
+  /// Forces of each triangle of a part on its corners, into m.corner_force; measure_membranes must have run at the same x. Marks in
   /// m.status the cells that are strained beyond the limit.
   virtual void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const = 0;
 
@@ -25,10 +26,14 @@ class Elasticity {
   }
 
   /// Internal forces at positions x, into force [vertex, 3] nN.
-  void membrane_forces(const MembraneViews& m, const Components<double>& x, const Components<double>& force) const {
+  /// @param parts  into which the cells are cut, for m.corner_force; none: all at once
+  void membrane_forces(const MembraneViews& m, const Components<double>& x, const Components<double>& force,
+                       const std::vector<CellPart>& parts = {}) const {
     measure_membranes(m, x);
-    evaluate_triangles(m, x);
-    gather_forces(m, force);
+    for_parts(m, parts, [&](const MembraneViews& part) {
+      evaluate_triangles(part, x);
+      gather_forces(part, force);
+    });
   }
 
   virtual void fill_rows(const MembraneViews& m, const Table<double>& table) const = 0;
@@ -38,15 +43,24 @@ class Elasticity {
   virtual void measure_stiffening(const MembraneViews& m, const Array<double>& stiffening) const = 0;
 };
 
+/// Those of a part [first, last). @param listed  their numbers, rising, of ListedCells
+inline AllCells cells_within(const AllCells&, const std::vector<int>&, int first, int last) { return {last - first, first}; }
+inline ListedCells cells_within(const ListedCells& all, const std::vector<int>& listed, int first, int last) {
+  const auto from = std::lower_bound(listed.begin(), listed.end(), first), to = std::lower_bound(from, listed.end(), last);
+  return {all.cells, static_cast<int>(to - from), static_cast<int>(from - listed.begin())};
+}
+
 /// One law for the cells that have it.
 template <class Law, class Cells>
 class ElasticityOf final : public Elasticity {
  public:
-  /// @param laws  [type], those of the cells
-  ElasticityOf(const Array<Law>& laws, const Cells& cells) : laws_(laws), cells_(cells) {}
+  /// @param laws    [type], those of the cells
+  /// @param listed  the same as `cells`, where it is a list
+  ElasticityOf(const Array<Law>& laws, const Cells& cells, std::vector<int> listed = {})
+      : laws_(laws), cells_(cells), listed_(std::move(listed)) {}
 
   void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const override {
-    corpuscle::evaluate_triangles(m, laws_, cells_, x);
+    corpuscle::evaluate_triangles(m, laws_, cells_within(cells_, listed_, m.first_cell, m.first_cell + m.cells), x);
   }
   void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
     corpuscle::measure_cells(m, laws_, cells_, table);
@@ -58,6 +72,7 @@ class ElasticityOf final : public Elasticity {
  private:
   Array<Law> laws_;
   Cells cells_;
+  std::vector<int> listed_;
 };
 
 /// Cells of several laws: each law's in turn.

@@ -35,10 +35,10 @@ inline void measure_membranes(const MembraneViews& m, const Components<double>& 
       });
 }
 
-/// Forces of each triangle on its corners; measure_membranes must have run at the same x. Marks overstrained cells in
+/// Forces of each triangle of a part on its corners; measure_membranes must have run at the same x. Marks overstrained cells in
 /// m.status.
 /// @param laws   [type], read for those of the cells
-/// @param cells  AllCells or ListedCells
+/// @param cells  AllCells or ListedCells, of the part
 template <class Law, class Cells>
 void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Cells& cells, const Components<double>& x) {
   for_sections_of(
@@ -65,7 +65,7 @@ void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Ce
           Vec3 force[3];
           const double strain = triangle_forces(state, m.rest(t + shift), law, in_plane, loads, force);
           for (int k = 0; k < 3; ++k) {
-            for (int d = 0; d < 3; ++d) m.corner_force(t, 3 * k + d) = force[k][d];
+            for (int d = 0; d < 3; ++d) m.corner_force(t - m.first_triangle, 3 * k + d) = force[k][d];
           }
           if (!(strain < Law::limit)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
         });
@@ -101,7 +101,7 @@ void measure_stiffening(const MembraneViews& m, const Array<Law>& laws, const Ce
 KOKKOS_INLINE_FUNCTION Vec3 gather_force(const MembraneViews& m, int i) {
   Vec3 force;
   for (int r = m.surface.ring_start(i); r < m.surface.ring_start(i + 1); ++r) {
-    const int t = m.surface.ring_triangle(r), k = 3 * m.surface.ring_corner(r);
+    const int t = m.surface.ring_triangle(r) - m.first_triangle, k = 3 * m.surface.ring_corner(r);
     force += Vec3{m.corner_force(t, k), m.corner_force(t, k + 1), m.corner_force(t, k + 2)};
   }
   return force;
@@ -121,10 +121,10 @@ KOKKOS_INLINE_FUNCTION Vec3 gather_area(const MembraneViews& m, int i, double& a
   return gradient;
 }
 
-/// Sums of the triangles' forces, into force [vertex, 3] nN.
+/// Sums of the triangles' forces, into force [vertex, 3] nN, of a part.
 inline void gather_forces(const MembraneViews& m, const Components<double>& force) {
   Kokkos::parallel_for(
-      "corpuscle::membrane::gather_forces", Policy(0, m.vertices),
+      "corpuscle::membrane::gather_forces", Policy(m.first_vertex, m.first_vertex + m.vertices),
       KOKKOS_LAMBDA(int i) { store(force, i, gather_force(m, i)); });
 }
 

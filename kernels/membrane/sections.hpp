@@ -15,14 +15,16 @@ using SectionTeam = typename Kokkos::TeamPolicy<Exec>::member_type;
 /// Which cells a kernel is for: all of `count`,
 struct AllCells {
   int count = 0;
-  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return n; }
+  int first = 0;
+  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return first + n; }
 };
 
 /// or those of a list.
 struct ListedCells {
-  Array<int> cells;  // [count]
+  Array<int> cells;  // rising
   int count = 0;
-  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return cells(n); }
+  int first = 0;  // in the list
+  KOKKOS_INLINE_FUNCTION int operator()(int n) const { return cells(first + n); }
 };
 
 template <class Cells, class Body>
@@ -37,6 +39,7 @@ struct SectionKernel {
 /// Run body(team, cell, section) for every section of the cells.
 template <class Cells, class Body>
 void for_sections_of(const std::string& label, const Cells& cells, const Body& body) {
+  if (cells.count == 0) return;
   Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells.count * sections, Kokkos::AUTO),
                        SectionKernel<Cells, Body>{cells, body});
 }

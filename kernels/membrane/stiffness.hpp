@@ -61,17 +61,17 @@ inline void difference_forces(const MembraneViews& m, const StiffnessViews& w, d
       });
 }
 
-/// Largest eigenvalue for each cell. @param eigenvalue  [cells] nN/um
+/// Largest eigenvalue for each cell. @param eigenvalue  [cells] nN/um  @param parts  as Elasticity::membrane_forces()
 inline void largest_stiffness(const MembraneViews& m, const Elasticity& elasticity, const StiffnessViews& w,
-                              int iterations, const Array<double>& eigenvalue) {
+                              int iterations, const Array<double>& eigenvalue, const std::vector<CellPart>& parts = {}) {
   // Small against an edge, large against the rounding of positions: the difference is good to about 1e-6.
   constexpr double distance = 1e-4;
   start_mode(m, w);
   for (int i = 0; i < iterations; ++i) {
     displace(m, w, distance);
-    elasticity.membrane_forces(m, w.probe, w.force_ahead);
+    elasticity.membrane_forces(m, w.probe, w.force_ahead, parts);
     displace(m, w, -distance);
-    elasticity.membrane_forces(m, w.probe, w.force_behind);
+    elasticity.membrane_forces(m, w.probe, w.force_behind, parts);
     difference_forces(m, w, distance);
   }
   Kokkos::parallel_for(

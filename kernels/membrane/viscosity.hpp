@@ -41,16 +41,16 @@ struct FullDamping {
   KOKKOS_INLINE_FUNCTION static double isotropic(const CellLaw& law) { return law.tangential_damping; }
 };
 
-/// Work arrays that exist only with membrane viscosity.
+/// Work arrays that exist only with membrane viscosity: all but `iterations` hold a part of the cells.
 struct ViscosityViews {
-  Array<int> neighbour;                        // [ring entry] vertex that it leads to
-  Array<double> inverse_length;                // [ring entry] 1/um, of the edge to it
-  Array<double> diagonal;                      // [vertex] M/dt + beta A, pg/us
-  Table<double> block;                         // [vertex, 6] inverse of the diagonal 3x3 block; none where the matrix is factorised
-  Components<double> right_side;               // [vertex, 3] nN
-  Components<double> gradient;                 // [vertex, 3] dV/dx, um2
-  Components<double> residual, search, image;  // [vertex, 3]
-  Components<double> inverse_gradient;         // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
+  RowsFrom<Array<int>> neighbour;              // [ring entry] vertex that it leads to
+  RowsFrom<Array<double>> inverse_length;      // [ring entry] 1/um, of the edge to it
+  RowsFrom<Array<double>> diagonal;            // [vertex] M/dt + beta A, pg/us
+  RowsFrom<Table<double>> block;               // [vertex, 6] inverse of the diagonal 3x3 block; none where the matrix is factorised
+  RowsFrom<Components<double>> right_side;     // [vertex, 3] nN
+  RowsFrom<Components<double>> gradient;       // [vertex, 3] dV/dx, um2
+  RowsFrom<Components<double>> residual, search, image;  // [vertex, 3]
+  RowsFrom<Components<double>> inverse_gradient;  // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
   Array<int> iterations;                       // [cell] of the last velocity solve; negative if it did not converge
   double times = 1;                            // of D on the left-hand side
 };
@@ -119,12 +119,12 @@ KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReact
   return load(fluid.force, i) + last + carried_on * fluid.ahead * (last - before);
 }
 
-/// Right-hand side, diagonal, preconditioner and volume gradient at the current positions.
+/// Right-hand side, diagonal, preconditioner and volume gradient at the current positions, of a part.
 template <class Damping, class Load>
 void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Load& outside, double dt) {
   const auto x = m.surface.x, v = m.surface.v;
   Kokkos::parallel_for(
-      "corpuscle::membrane::assemble_viscous", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::membrane::assemble_viscous", Policy(m.first_vertex, m.first_vertex + m.vertices), KOKKOS_LAMBDA(int i) {
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
         const double inertia = law.vertex_mass / dt;
         double area;
@@ -148,7 +148,7 @@ void assemble_viscous(const MembraneViews& m, const ViscosityViews& w, const Loa
           b.xy += c * e.x * e.y, b.xz += c * e.x * e.z, b.yz += c * e.y * e.z;
         }
         store(w.right_side, i, inertia * load(v, i) + driving_force(m, outside, i, area, reaction));
-        if (w.block.extent(0) == 0) return;
+        if (w.block.rows.extent(0) == 0) return;
         const double d = diagonal + times * (last - first) * Damping::isotropic(law);
         b.xx += d, b.yy += d, b.zz += d;
         const Symmetric3 inv = inverse(b);
@@ -209,11 +209,12 @@ struct ViscousMatrix {
 /// Conjugate gradients on one cell, by one team.
 template <class Damping>
 struct ViscousSolve : ViscousMatrix<Damping> {
-  Components<double> right_side, solution;  // [vertex, 3]; the solution also holds the first guess
+  RowsFrom<Components<double>> right_side;  // [vertex, 3]
+  Components<double> solution;              // [vertex, 3] also holds the first guess
   double tolerance;  // of the residual over the right-hand side, both in the preconditioner's norm
   int max_iterations;
 
-  KOKKOS_INLINE_FUNCTION ViscousSolve(const ViscousMatrix<Damping>& matrix, const Components<double>& b, const Components<double>& x,
+  KOKKOS_INLINE_FUNCTION ViscousSolve(const ViscousMatrix<Damping>& matrix, const RowsFrom<Components<double>>& b, const Components<double>& x,
                                       double share, int most)
       : ViscousMatrix<Damping>(matrix), right_side(b), solution(x), tolerance(share), max_iterations(most) {}
 
@@ -275,8 +276,9 @@ struct HeldViscousSolve : ViscousMatrix<Damping> {
   KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
     const MembraneViews& m = this->m;
     const ViscosityViews& w = this->w;
-    const Components<double>&v = m.surface.v, &h = w.inverse_gradient;
-    const int cell = team.league_rank();
+    const auto& v = m.surface.v;
+    const auto& h = w.inverse_gradient;
+    const int cell = m.first_cell + team.league_rank();
     const int first = m.surface.first_vertex(cell), last = m.surface.first_vertex(cell + 1);
     const CellLaw law = m.law(m.type(cell));
     const Sums<2> of_gradient = this->both(team, first, last, [&](int i, Sums<2>& part) {
@@ -353,7 +355,7 @@ Kokkos::TeamPolicy<Exec> large_teams(int teams, [[maybe_unused]] const Solve& so
 
 /// Solve for `solution`, which holds the first guess.
 template <class Damping>
-void solve_viscous(const MembraneViews& m, const ViscosityViews& w, const Components<double>& right_side,
+void solve_viscous(const MembraneViews& m, const ViscosityViews& w, const RowsFrom<Components<double>>& right_side,
                    const Components<double>& solution) {
   const ViscousSolve<Damping> solve({m, w}, right_side, solution, viscous_tolerance, viscous_iterations);
   Kokkos::parallel_for("corpuscle::membrane::viscous_solve", large_teams(m.cells, solve), solve);
@@ -384,7 +386,7 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
-/// The velocity under whatever pressure inside keeps the volume, after assemble_viscous(). A fluid that cannot be compressed answers to
+/// The velocity under whatever pressure inside keeps the volume, of a part, after assemble_viscous(). A fluid that cannot be compressed answers to
 /// such a pressure with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
 template <class Damping>
 void solve_held(const MembraneViews& m, const ViscosityViews& w) {
@@ -392,13 +394,13 @@ void solve_held(const MembraneViews& m, const ViscosityViews& w) {
   Kokkos::parallel_for("corpuscle::membrane::viscous_solve", large_teams(m.cells, solve), solve);
 }
 
-/// damping = D v, which is taken off m.force and, if it is another array, off `force`.
+/// damping = D v of a part, which is taken off m.force and, if it is another array, off `force`.
 template <class Damping, class Taken>
 void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v,
                       const Components<double>& force, const Taken& damping) {
   const bool two = force.data() != m.force.data();
   Kokkos::parallel_for(
-      "corpuscle::membrane::subtract_damping", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::membrane::subtract_damping", Policy(m.first_vertex, m.first_vertex + m.vertices), KOKKOS_LAMBDA(int i) {
         const CellLaw law = m.law(m.type(m.surface.vertex_body(i)));
         const Vec3 taken = damping_at<Damping>(m.surface, w, law, v, i);
         store(damping, i, taken);
@@ -407,16 +409,15 @@ void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Com
       });
 }
 
-/// mode = D times the unit mode; `probe` is overwritten.
+/// probe = D times the unit mode, of a part.
 template <class Damping>
 void damp_mode(const MembraneViews& m, const ViscosityViews& w, const StiffnessViews& work) {
   Kokkos::parallel_for(
-      "corpuscle::membrane::damp_mode", Policy(0, m.vertices), KOKKOS_LAMBDA(int i) {
+      "corpuscle::membrane::damp_mode", Policy(m.first_vertex, m.first_vertex + m.vertices), KOKKOS_LAMBDA(int i) {
         const int cell = m.surface.vertex_body(i);
         const Vec3 damped = damping_at<Damping>(m.surface, w, m.law(m.type(cell)), work.mode, i);
         store(work.probe, i, (1 / std::sqrt(section_total(work.sums, cell, 0))) * damped);
       });
-  copy_vertices(m.vertices, work.probe, work.mode);
 }
 
 /// D v for given velocities, into `force` with its sign: the dissipative force on each vertex, nN.

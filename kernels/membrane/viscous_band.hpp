@@ -180,7 +180,7 @@ struct BandedViscousSolve {
 
   KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
     const int t = team.league_rank();
-    for (int number = t; number < m.cells; number += band.teams) {
+    for (int number = m.first_cell + t; number < m.first_cell + m.cells; number += band.teams) {
       const int first = m.surface.first_vertex(number), vertices = m.surface.first_vertex(number + 1) - first;
       solve(team, {number, first, vertices, band.first_place(m.type(number)), &band.column(t, 0), &band.right_side(t, 0),
                    &band.right_side(t, 3 * vertices)});

@@ -50,10 +50,8 @@ KOKKOS_INLINE_FUNCTION double kink_share_at_sides(const TransferBlock& block, co
 }
 
 /// `way` is zero where there is nothing to take off.
-KOKKOS_INLINE_FUNCTION MarkerKink marker_kink(const TransferBlock& block, const SlipViews& slip, const MarkerViews& m, int marker,
-                                              const double (&eta)[3]) {
+KOKKOS_INLINE_FUNCTION MarkerKink marker_kink(const TransferBlock& block, const SlipViews& slip, int v, const double (&eta)[3]) {
   MarkerKink kink;
-  const int v = m.vertex(marker);
   const double ratio = slip.ratio_of(v), share = ratio == 1 ? 0 : kink_share_at_sides(block, eta);
   if (share == 0) return kink;
   kink.normal = load(slip.normal, v);
@@ -99,9 +97,8 @@ KOKKOS_INLINE_FUNCTION void visit_changes(const TransferBlock& block, const doub
 }
 
 /// The areas that a marker sees, and how they change along each direction of the grid: change[d][e] is that along e.
-template <class Delta>
-KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const MarkerViews& m, int marker, const double (&eta)[3],
-                                             Vec3 (&change)[3][3]) {
+template <class Delta, class Lines>
+KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const Lines& lines, const double (&eta)[3], Vec3 (&change)[3][3]) {
   if (block.even) return;
   const bool folded = is_folded<Delta>(block, eta);
   for (int d = 0; d < 3; ++d) {
@@ -112,7 +109,7 @@ KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const M
       });
     else
       changes_of_mean<Delta>(
-          m, marker, d,
+          lines, d,
           [&](int i, int j, int k) {
             const int row[3] = {i, j, k};
             return area(block.index().cell(i, j, k), row);
@@ -123,13 +120,13 @@ KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const M
 
 /// How the sum of the fluxes through the faces of direction d, as a marker sees them, changes along each direction of the grid: this rank's
 /// part. @param u  [cell, 3] um/us, read on the sides of the block
-template <class Delta>
+template <class Delta, class Lines>
 KOKKOS_INLINE_FUNCTION void changes_of_flux(const TransferBlock& block, const FaceForce& through, const Components<double>& u,
-                                            const MarkerViews& m, int marker, const double (&eta)[3], int d, double (&change)[3]) {
+                                            const Lines& lines, const double (&eta)[3], int d, double (&change)[3]) {
   const auto owned = [&](int i, int j, int k) { return block.owns(0, d == 0, i) && block.owns(1, d == 1, j) && block.owns(2, d == 2, k); };
   if (!is_folded<Delta>(block, eta)) {
     changes_of_mean<Delta>(
-        m, marker, d, [&](int i, int j, int k) { return owned(i, j, k) ? through(d, block.index().cell(i, j, k)) : 0.0; }, change);
+        lines, d, [&](int i, int j, int k) { return owned(i, j, k) ? through(d, block.index().cell(i, j, k)) : 0.0; }, change);
     return;
   }
   visit_changes<Delta>(block, eta, d, [&](int c, const double(&w)[3], const int(&row)[3], const int(&end)[3]) {
@@ -150,19 +147,21 @@ void resolve_kinked_forces(const TransferBlock& transfer_block, const SlipViews&
   const SlipViews slip = slip_views;
   const MarkerViews m = markers;
   Kokkos::parallel_for(
-      "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+      "corpuscle::transfer::resolve_forces", Policy(0, m.rows), KOKKOS_LAMBDA(int row) {
+        const int marker = m.order(m.first + row), v = m.vertex(marker);
         const MarkerPlace place(block.lattice, m, marker);
-        const DualBasis dual = seen_areas<Delta>(block, m, marker, place.eta);
-        Vec3 f = load(force, m.vertex(marker));
-        const MarkerKink kink = marker_kink(block, slip, m, marker, place.eta);
+        const StoredLines<Delta> lines{m, row};
+        const DualBasis dual = seen_areas<Delta>(block, lines, place.eta);
+        Vec3 f = load(force, v);
+        const MarkerKink kink = marker_kink(block, slip, v, place.eta);
         if (kink.way != 0) {
           Vec3 change[3][3], rest;
-          changes_of_areas<Delta>(block, m, marker, place.eta, change);
+          changes_of_areas<Delta>(block, lines, place.eta, change);
           for (int d = 0; d < 3; ++d)
             for (int e = 0; e < 3; ++e) rest += dot(dual.b[d], kink.of_force(f, e)) * change[d][e];
           f -= rest;
         }
-        for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
+        for (int d = 0; d < 3; ++d) m.across(row, d) = dot(dual.b[d], f);
       });
 }
 
@@ -174,46 +173,48 @@ void resolve_dipoles(const TransferBlock& transfer_block, const SlipViews& slip_
   const SlipViews slip = slip_views;
   const MarkerViews m = markers;
   Kokkos::parallel_for(
-      "corpuscle::transfer::resolve_dipoles", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+      "corpuscle::transfer::resolve_dipoles", Policy(0, m.rows), KOKKOS_LAMBDA(int row) {
+        const int marker = m.order(m.first + row), v = m.vertex(marker);
         const MarkerPlace place(block.lattice, m, marker);
-        const MarkerKink kink = marker_kink(block, slip, m, marker, place.eta);
-        const Vec3 f = load(force, m.vertex(marker));
-        const Vec3 across = kink.way != 0 ? seen_areas<Delta>(block, m, marker, place.eta).b[d] : Vec3{};
-        for (int e = 0; e < 3; ++e) m.dipole(marker, e) = kink.way != 0 ? dot(across, kink.of_force(f, e)) : 0;
+        const MarkerKink kink = marker_kink(block, slip, v, place.eta);
+        const Vec3 f = load(force, v);
+        const Vec3 across = kink.way != 0 ? seen_areas<Delta>(block, StoredLines<Delta>{m, row}, place.eta).b[d] : Vec3{};
+        for (int e = 0; e < 3; ++e) m.dipole(row, e) = kink.way != 0 ? dot(across, kink.of_force(f, e)) : 0;
       });
 }
 
 /// spread_forces() of markers with dipoles, of direction d alone.
 template <class Delta>
-void spread_dipoles(const TransferBlock& transfer_block, const MarkerViews& markers, int direction, const Array<double>& across) {
+void spread_dipoles(const TransferBlock& transfer_block, const MarkerViews& markers, const Planes& planes, int direction,
+                    const Array<double>& across) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   const IndexSpace index = block.index();
   const Array<double> out = across;
   const int d = direction;
   for_box(
-      "corpuscle::transfer::spread_dipoles", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
+      "corpuscle::transfer::spread_dipoles", {0, 0, planes.begin}, {block.rows(0, true), block.rows(1, true), planes.end},
       KOKKOS_LAMBDA(int i, int j, int k) {
         constexpr int points = Delta::points;
         const int at[3] = {i, j, k};
         double sum = 0;
-        visit_markers<Delta>(index, m, i, j, k, [&](int marker) {
+        visit_markers<Delta>(index, m, i, j, k, [&](int row) {
           double w[3], slope[3];
           int line[3], point[3];
           for (int e = 2; e >= 0; --e) {
             line[e] = e == d ? 3 + e : e;
-            point[e] = at[e] - m.base(marker, line[e]);
+            point[e] = at[e] - m.base(row, line[e]);
             if (point[e] < 0 || point[e] >= points) return;
-            w[e] = m.weight(marker, line[e] * points + point[e]);
+            w[e] = m.weight(row, line[e] * points + point[e]);
           }
-          sum += w[0] * w[1] * w[2] * m.across(marker, d);
-          const double q[3] = {m.dipole(marker, 0), m.dipole(marker, 1), m.dipole(marker, 2)};
+          sum += w[0] * w[1] * w[2] * m.across(row, d);
+          const double q[3] = {m.dipole(row, 0), m.dipole(row, 1), m.dipole(row, 2)};
           if (q[0] == 0 && q[1] == 0 && q[2] == 0) return;
           for (int e = 0; e < 3; ++e) {
             const int first = at[e] - point[e], last = index.n[e] - (e == d ? 0 : 1);
             const bool folded = (block.lattice.boundary_below[e] && first < 0) || (block.lattice.boundary_above[e] && first + points - 1 > last);
-            slope[e] = folded ? folded_slope<Delta>(block, e, e == d, MarkerPlace(block.lattice, m, marker).eta[e], at[e])
-                              : Delta::slope([&](int p) { return m.weight(marker, line[e] * points + p); }, point[e]);
+            slope[e] = folded ? folded_slope<Delta>(block, e, e == d, MarkerPlace(block.lattice, m, m.order(m.first + row)).eta[e], at[e])
+                              : Delta::slope([&](int p) { return m.weight(row, line[e] * points + p); }, point[e]);
           }
           sum += q[0] * slope[0] * w[1] * w[2] + q[1] * w[0] * slope[1] * w[2] + q[2] * w[0] * w[1] * slope[2];
         });
@@ -234,16 +235,17 @@ void add_kinks(const TransferBlock& transfer_block, const SlipViews& slip_views,
       "corpuscle::transfer::add_kinks", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         const MarkerPlace place(block.lattice, m, marker);
         const double(&eta)[3] = place.eta;
-        const MarkerKink kink = marker_kink(block, slip, m, marker, eta);
-        if (kink.way == 0) return;
-        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
-        Vec3 change[3][3], du[3];
-        changes_of_areas<Delta>(block, m, marker, place.eta, change);
         const int v = m.vertex(marker);
+        const MarkerKink kink = marker_kink(block, slip, v, eta);
+        if (kink.way == 0) return;
+        const MarkerLines<Delta> lines(block, eta);
+        const DualBasis dual = seen_areas<Delta>(block, lines, eta);
+        Vec3 change[3][3], du[3];
+        changes_of_areas<Delta>(block, lines, eta, change);
         const Vec3 own = load(of_vertex, v);
         for (int d = 0; d < 3; ++d) {
           double sum[3] = {0, 0, 0};
-          changes_of_flux<Delta>(block, through, u, m, marker, eta, d, sum);
+          changes_of_flux<Delta>(block, through, u, lines, eta, d, sum);
           for (int e = 0; e < 3; ++e) du[e] += (sum[e] - dot(change[d][e], own)) * dual.b[d];
         }
         Vec3 moved = own;

@@ -22,4 +22,14 @@ inline void sort_markers(const Lattice& of_block, const MarkerViews& markers) {
       KOKKOS_LAMBDA(int marker) { return marker_cell(m, lattice, marker); }, m.start, m.order);
 }
 
+/// The first of m.order in each plane of cells along the last direction, halo included, and behind the last plane the number of all.
+/// @param first  [plane + 1]
+inline void first_of_planes(const IndexSpace& index, const MarkerViews& markers, const Array<int>& first) {
+  const auto start = markers.start;
+  const auto out = first;
+  const int plane = index.stride(2);
+  Kokkos::parallel_for(
+      "corpuscle::transfer::first_of_planes", Policy(0, index.padded(2) + 1), KOKKOS_LAMBDA(int p) { out(p) = start(p * plane); });
+}
+
 }  // namespace corpuscle

@@ -8,16 +8,18 @@
 
 namespace corpuscle {
 
-/// Arrays have room for more markers than there are; `points` is that of the kernel. A marker takes 190 bytes, 214 with dipoles.
+/// Arrays have room for more markers than there are; `points` is that of the kernel. What faces ask of markers is held in rows for the
+/// markers of some planes of cells at a time: 180 bytes each, 204 with dipoles.
 struct MarkerViews {
   int count = 0;
   Array<int> vertex;            // [marker] where it comes from
   Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex and its copies, of all ranks, that lies in its rank's own cells
   Table<double> xi;             // [vertex, 3] places in the lattice: VertexPlaces::xi
-  Table<short> base;            // [marker, 6] first cell, then first face, along each direction that it reaches
-  Table<double> weight;         // [marker, 6 points] of those lines of points
-  Table<double> across;         // [marker, 3] what its force amounts to as pressure across faces of each direction, kPa
-  Table<double> dipole;         // [marker, 3] the same of its changes along each direction, across the faces of one (kink.hpp)
+  int first = 0, rows = 0;      // those of `order` that have rows
+  Table<short> base;            // [row, 6] first cell, then first face, along each direction that it reaches
+  Table<double> weight;         // [row, 6 points] of those lines of points
+  Table<double> across;         // [row, 3] what its force amounts to as pressure across faces of each direction, kPa
+  Table<double> dipole;         // [row, 3] the same of its changes along each direction, across the faces of one (kink.hpp)
   Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
   Array<int> order;             // markers by cell, in each cell in the order of their numbers
   Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces
@@ -71,11 +73,16 @@ struct DeltaLine {
 };
 
 template <class Delta>
+KOKKOS_INLINE_FUNCTION int first_point(bool faces, double eta) {
+  return Delta::first(faces ? eta + 0.5 : eta);
+}
+
+template <class Delta>
 KOKKOS_INLINE_FUNCTION DeltaLine<Delta> delta_line(const TransferBlock& block, int e, bool faces, double eta) {
   const int n = block.index().n[e];
   const double t = faces ? eta + 0.5 : eta;
   DeltaLine<Delta> line;
-  line.base = Delta::first(t);
+  line.base = first_point<Delta>(faces, eta);
   for (int p = 0; p < Delta::points; ++p) {
     const int i = line.base + p;
     line.weight[p] = Delta::value(i - t);
@@ -87,5 +94,42 @@ KOKKOS_INLINE_FUNCTION DeltaLine<Delta> delta_line(const TransferBlock& block, i
   }
   return line;
 }
+
+/// The points that a marker reaches: along each direction the cells, then the faces. Weights of points beyond a side are folded back:
+/// reflected where the side gives the velocity (no slip is then exact, and a force keeps its moment about the wall, which takes the rest
+/// of it), added where it gives the derivative.
+template <class Delta>
+struct MarkerLines {
+  static constexpr int points = Delta::points;
+  int first[6];
+  double value[6 * points];
+
+  KOKKOS_INLINE_FUNCTION MarkerLines(const TransferBlock& block, const double (&eta)[3]) {
+    for (int e = 0; e < 3; ++e)
+      for (int faces = 0; faces < 2; ++faces) {
+        const DeltaLine<Delta> line = delta_line<Delta>(block, e, faces == 1, eta[e]);
+        double* const folded = value + (3 * faces + e) * points;
+        for (int p = 0; p < points; ++p) folded[p] = 0;
+        for (int p = 0; p < points; ++p) {
+          const int to = line.row[p] - line.base;  // out of range where the weight is zero
+          if (to >= 0 && to < points)
+            folded[to] += line.end[p] < 0 ? line.weight[p] : block.reflection[e][line.end[p]][faces] * line.weight[p];
+        }
+        first[3 * faces + e] = line.base;
+      }
+  }
+  KOKKOS_INLINE_FUNCTION int base(int line) const { return first[line]; }
+  KOKKOS_INLINE_FUNCTION double weight(int line, int point) const { return value[line * points + point]; }
+};
+
+/// The same of a marker's row.
+template <class Delta>
+struct StoredLines {
+  const MarkerViews& markers;
+  int row;
+
+  KOKKOS_INLINE_FUNCTION int base(int line) const { return markers.base(row, line); }
+  KOKKOS_INLINE_FUNCTION double weight(int line, int point) const { return markers.weight(row, line * Delta::points + point); }
+};
 
 }  // namespace corpuscle

@@ -76,15 +76,15 @@ KOKKOS_INLINE_FUNCTION bool is_folded(const TransferBlock& block, const double (
 
 /// How the mean of value(i, j, k) over the faces of direction d that a marker reaches, which is not folded, changes along each direction of
 /// the grid.
-template <class Delta, class Value, class Sum>
-KOKKOS_INLINE_FUNCTION void changes_of_mean(const MarkerViews& m, int marker, int d, const Value& value, Sum (&change)[3]) {
+template <class Delta, class Lines, class Value, class Sum>
+KOKKOS_INLINE_FUNCTION void changes_of_mean(const Lines& lines, int d, const Value& value, Sum (&change)[3]) {
   constexpr int points = Delta::points;
   double weight[3][points], slope[3][points];
   int base[3];
   for (int e = 0; e < 3; ++e) {
     const int line = e == d ? 3 + e : e;
-    base[e] = m.base(marker, line);
-    for (int p = 0; p < points; ++p) weight[e][p] = m.weight(marker, line * points + p);
+    base[e] = lines.base(line);
+    for (int p = 0; p < points; ++p) weight[e][p] = lines.weight(line, p);
     for (int p = 0; p < points; ++p) slope[e][p] = Delta::slope([&](int q) { return weight[e][q]; }, p);
   }
   for (int k = 0; k < points; ++k)
@@ -102,8 +102,8 @@ KOKKOS_INLINE_FUNCTION void changes_of_mean(const MarkerViews& m, int marker, in
 }
 
 /// The same as seen_areas() of its place, with the weights that it has.
-template <class Delta>
-KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const MarkerViews& m, int marker, const double (&eta)[3]) {
+template <class Delta, class Lines>
+KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const Lines& lines, const double (&eta)[3]) {
   if (is_folded<Delta>(block, eta)) return seen_areas<Delta>(block, eta);
   if (block.even) {
     const int any = block.index().cell(0, 0, 0);
@@ -118,8 +118,8 @@ KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const Ma
     for (int k = 0; k < points; ++k)
       for (int j = 0; j < points; ++j)
         for (int i = 0; i < points; ++i) {
-          const int row[3] = {m.base(marker, line[0]) + i, m.base(marker, line[1]) + j, m.base(marker, line[2]) + k};
-          const double w = m.weight(marker, line[0] * points + i) * m.weight(marker, line[1] * points + j) * m.weight(marker, line[2] * points + k);
+          const int row[3] = {lines.base(line[0]) + i, lines.base(line[1]) + j, lines.base(line[2]) + k};
+          const double w = lines.weight(line[0], i) * lines.weight(line[1], j) * lines.weight(line[2], k);
           const int c = block.index().cell(row[0], row[1], row[2]);
           sum += w * (points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c));
         }
@@ -128,45 +128,32 @@ KOKKOS_INLINE_FUNCTION DualBasis seen_areas(const TransferBlock& block, const Ma
   return DualBasis(seen[0], seen[1], seen[2]);
 }
 
-/// base and weight of every marker. Weights of points beyond a side are folded back: reflected where the side gives
-/// the velocity (no slip is then exact, and a force keeps its moment about the wall, which takes the rest of it), added where
-/// it gives the derivative.
+/// base and weight of the markers that have rows.
 template <class Delta>
 void prepare_markers(const TransferBlock& transfer_block, const MarkerViews& markers) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   Kokkos::parallel_for(
-      "corpuscle::transfer::prepare_markers", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
-        constexpr int points = Delta::points;
-        const MarkerPlace place(block.lattice, m, marker);
-        const double(&eta)[3] = place.eta;
-        for (int e = 0; e < 3; ++e)
-          for (int faces = 0; faces < 2; ++faces) {
-            const DeltaLine<Delta> line = delta_line<Delta>(block, e, faces == 1, eta[e]);
-            double folded[points] = {};
-            for (int p = 0; p < points; ++p) {
-              const int to = line.row[p] - line.base;  // out of range where the weight is zero
-              if (to >= 0 && to < points)
-                folded[to] += line.end[p] < 0 ? line.weight[p] : block.reflection[e][line.end[p]][faces] * line.weight[p];
-            }
-            m.base(marker, 3 * faces + e) = static_cast<short>(line.base);
-            for (int p = 0; p < points; ++p) m.weight(marker, (3 * faces + e) * points + p) = folded[p];
-          }
+      "corpuscle::transfer::prepare_markers", Policy(0, m.rows), KOKKOS_LAMBDA(int row) {
+        const MarkerPlace place(block.lattice, m, m.order(m.first + row));
+        const MarkerLines<Delta> lines(block, place.eta);
+        for (int line = 0; line < 6; ++line) m.base(row, line) = static_cast<short>(lines.first[line]);
+        for (int n = 0; n < 6 * Delta::points; ++n) m.weight(row, n) = lines.value[n];
       });
 }
 
-/// markers.across of the forces [vertex, 3], nN.
+/// markers.across of the forces [vertex, 3], nN. After prepare_markers(), as all that follows of rows.
 template <class Delta>
 void resolve_forces(const TransferBlock& transfer_block, const MarkerViews& markers, const Components<double>& force) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
   Kokkos::parallel_for(
-      "corpuscle::transfer::resolve_forces", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+      "corpuscle::transfer::resolve_forces", Policy(0, m.rows), KOKKOS_LAMBDA(int row) {
+        const int marker = m.order(m.first + row);
         const MarkerPlace place(block.lattice, m, marker);
-        const double(&eta)[3] = place.eta;
-        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
+        const DualBasis dual = seen_areas<Delta>(block, StoredLines<Delta>{m, row}, place.eta);
         const Vec3 f = load(force, m.vertex(marker));
-        for (int d = 0; d < 3; ++d) m.across(marker, d) = dot(dual.b[d], f);
+        for (int d = 0; d < 3; ++d) m.across(row, d) = dot(dual.b[d], f);
       });
 }
 
@@ -178,9 +165,10 @@ void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) 
   Kokkos::deep_copy(Exec(), m.near, static_cast<unsigned char>(0));
   Kokkos::parallel_for(
       "corpuscle::transfer::mark_near", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        const MarkerPlace place(block.lattice, m, marker);
         int lower[3], upper[3];
         for (int e = 0; e < 3; ++e) {
-          const int cell = m.base(marker, e), face = m.base(marker, 3 + e);
+          const int cell = first_point<Delta>(false, place.eta[e]), face = first_point<Delta>(true, place.eta[e]);
           lower[e] = cell < face ? cell : face;
           upper[e] = (cell < face ? face : cell) + Delta::points;
           lower[e] = lower[e] > 0 ? lower[e] : 0;
@@ -192,44 +180,56 @@ void mark_near(const TransferBlock& transfer_block, const MarkerViews& markers) 
       });
 }
 
-/// Calls visit(marker) for the markers that may reach cell (i, j, k) or its low
+/// How many cells on a marker may reach one, or its low faces, from below and from above.
+template <class Delta>
+struct MarkerReach {
+  static constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;
+};
+
+/// Calls visit(row) for the markers that may reach cell (i, j, k) or its low
 /// faces, in the order of cells and of markers in them.
 template <class Delta, class Visit>
 KOKKOS_INLINE_FUNCTION void visit_markers(const IndexSpace& index, const MarkerViews& m, int i, int j, int k, const Visit& visit) {
-  constexpr int below = -2, above = Delta::points == 3 ? 1 : 2;  // cells whose markers reach
+  constexpr int below = MarkerReach<Delta>::below, above = MarkerReach<Delta>::above;
   const int last = m.near(index.cell(i, j, k)) ? above : below - 1;
   for (int dk = below; dk <= last; ++dk)
     for (int dj = below; dj <= above; ++dj) {
       const int line = index.cell(i + below, j + dj, k + dk), end = m.start(line + above - below + 1);
-      for (int s = m.start(line); s < end; ++s) visit(m.order(s));
+      for (int s = m.start(line); s < end; ++s) visit(s - m.first);
     }
 }
 
-/// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
+/// Planes of cells and their low faces, along the last direction.
+struct Planes {
+  int begin = 0, end = 0;
+};
+
+/// across [cell] kPa at the faces of this rank in some planes, of which all markers that reach them have rows: gathered, in the order of
+/// cells and of markers in them.
 template <class Delta>
-void spread_forces(const TransferBlock& block, const MarkerViews& markers, const FaceForce& force) {
+void spread_forces(const TransferBlock& block, const MarkerViews& markers, const Planes& planes, const FaceForce& force) {
   const MarkerViews m = markers;
   const IndexSpace index = block.index();
   const FaceForce out = force;
   for_box(
-      "corpuscle::transfer::spread_forces", {0, 0, 0}, {block.rows(0, true), block.rows(1, true), block.rows(2, true)},
+      "corpuscle::transfer::spread_forces", {0, 0, planes.begin}, {block.rows(0, true), block.rows(1, true), planes.end},
       KOKKOS_LAMBDA(int i, int j, int k) {
         constexpr int points = Delta::points;
         const int at[3] = {i, j, k}, c = index.cell(i, j, k);
         double sum[3] = {0, 0, 0};
-        visit_markers<Delta>(index, m, i, j, k, [&](int marker) {
+        visit_markers<Delta>(index, m, i, j, k, [&](int row) {
           double w[6];
           const auto reached = [&](int d) {  // along d, by cells or faces
             for (int e = d; e < 6; e += 3) {
-              const int p = at[d] - m.base(marker, e);
-              w[e] = p >= 0 && p < points ? m.weight(marker, e * points + p) : 0;
+              const int p = at[d] - m.base(row, e);
+              w[e] = p >= 0 && p < points ? m.weight(row, e * points + p) : 0;
             }
             return w[d] != 0 || w[d + 3] != 0;
           };
           if (!reached(2) || !reached(1) || !reached(0)) return;
-          sum[0] += w[3] * w[1] * w[2] * m.across(marker, 0);
-          sum[1] += w[0] * w[4] * w[2] * m.across(marker, 1);
-          sum[2] += w[0] * w[1] * w[5] * m.across(marker, 2);
+          sum[0] += w[3] * w[1] * w[2] * m.across(row, 0);
+          sum[1] += w[0] * w[4] * w[2] * m.across(row, 1);
+          sum[2] += w[0] * w[1] * w[5] * m.across(row, 2);
         });
         for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
       });
@@ -291,22 +291,22 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
         const MarkerPlace place(block.lattice, m, marker);
         const double(&eta)[3] = place.eta;
         const bool folded = is_folded<Delta>(block, eta);
-        const DualBasis dual = seen_areas<Delta>(block, m, marker, eta);
+        const MarkerLines<Delta> lines(block, eta);
+        const DualBasis dual = seen_areas<Delta>(block, lines, eta);
         Vec3 part;
         for (int d = 0; d < 3; ++d) {
+          const int line[3] = {d == 0 ? 3 : 0, d == 1 ? 4 : 1, d == 2 ? 5 : 2};
           double sum = 0;
           for (int c = 0; c < points; ++c) {
-            const int k = m.base(marker, 2 + (d == 2 ? 3 : 0)) + c;
+            const int k = lines.base(line[2]) + c;
             if (!block.owns(2, d == 2, k)) continue;
             for (int b = 0; b < points; ++b) {
-              const int j = m.base(marker, 1 + (d == 1 ? 3 : 0)) + b;
+              const int j = lines.base(line[1]) + b;
               if (!block.owns(1, d == 1, j)) continue;
-              const double w =
-                  m.weight(marker, (1 + (d == 1 ? 3 : 0)) * points + b) * m.weight(marker, (2 + (d == 2 ? 3 : 0)) * points + c);
+              const double w = lines.weight(line[1], b) * lines.weight(line[2], c);
               for (int a = 0; a < points; ++a) {
-                const int i = m.base(marker, d == 0 ? 3 : 0) + a;
-                if (block.owns(0, d == 0, i))
-                  sum += w * m.weight(marker, (d == 0 ? 3 : 0) * points + a) * through(d, index.cell(i, j, k));
+                const int i = lines.base(line[0]) + a;
+                if (block.owns(0, d == 0, i)) sum += w * lines.weight(line[0], a) * through(d, index.cell(i, j, k));
               }
             }
           }

@@ -203,14 +203,14 @@ void require_below(double count, const char* what, const char* remedy, const cha
 /// Bytes of a vertex' lists of the triangles within `range`, um, and the skin: four tenths of what membranes have everywhere alike,
 /// since a cell does not touch what is next to a vertex in its own membrane.
 double of_lists(const SceneSize& size, double range) {
-  constexpr double skin = 0.5, apart = 0.4, triangle = 4, body = 64, triangles_of_body = 20;
+  constexpr double skin = 0.5, apart = 0.4, triangle = 2, body = 72, triangles_of_body = 20;
   const double r = (1 + skin) * range, dense = size.volume > 0 ? 2 * (size.vertices - size.rigid) / size.volume : 0;
   return std::min(2 * (size.vertices - size.rigid), apart * dense * 4 / 3 * std::acos(-1.0) * r * r * r) * (triangle + body / triangles_of_body);
 }
 
 /// Bytes of a vertex, for [contact] and for the look at packed cells' gaps before the first step, of which there is one at a time.
 double of_contact(const Case& scene, const SceneSize& size) {
-  constexpr double contact = 56, look = 32, blended = 1.5, seen_beyond = 0.3;
+  constexpr double contact = 52, look = 32, blended = 1.5, seen_beyond = 0.3;
   double most = 0;
   if (scene.contact) {
     const double h = std::max({size.spacing[0], size.spacing[1], size.spacing[2]});
@@ -223,15 +223,24 @@ double of_contact(const Case& scene, const SceneSize& size) {
   return most;
 }
 
+/// Bytes of what the parts of a step have one after the other: the triangles' geometry and the forces of their corners, an eighth of the
+/// cells at a time; and markers' weights, of a quarter of the planes and three more.
+double of_workspace(const SceneSize& size) {
+  constexpr double geometry = 64, corners = 144, weights = 204, smallest_part = 16 * 500, fewest_planes = 6, beside = 3;
+  const double parts = std::clamp(std::floor(size.own / smallest_part), 1.0, 8.0), planes = size.block[2] + 1;
+  const double share = std::min(1.0, (std::max(fewest_planes, planes / 4) + beside) / planes);
+  return std::max((geometry + corners / parts) * size.own, weights * share * (size.own + size.copies));
+}
+
 /// Bytes on a rank.
 double of_shared_cells(const Case& scene, const SceneSize& size) {
-  // Of a vertex and its two triangles: surface, places, markers and their weights; of an own one, motion and the room of the forces' parts.
-  double vertex = 315, own = 88;
+  // Of a vertex and its two triangles: surface, places and markers; of an own one, motion.
+  double vertex = 125, own = 70;
   const auto viscous = [](const CellSettings& c) { return c.membrane_viscosity_N_s_per_m > 0; };
   if (any_cell(scene, viscous)) own += 3 * (8 + 4);  // MembraneViscosity
   if (scene.coupling->pressure == CouplingSettings::Pressure::sharp) vertex += 40;
   vertex += of_contact(scene, size);
-  return vertex * (size.own + size.copies) + own * size.own + size.cells_listed * 2 * sizeof(CellSettings);
+  return vertex * (size.own + size.copies) + own * size.own + of_workspace(size) + size.cells_listed * 2 * sizeof(CellSettings);
 }
 
 }  // namespace

@@ -31,7 +31,13 @@ template <class View, class... Columns>
 void grow(View& view, const char* name, std::size_t rows, Columns... columns) {
   if (view.data() && view.extent(0) >= rows) return;
   view = View();  // free before taking more
-  view = View(uninitialised(std::string("corpuscle::contact::") + name), rows + rows / 16 + 1, columns...);
+  view = View(uninitialised(std::string("corpuscle::contact::") + name), rows + rows / 64 + 1, columns...);
+}
+/// The same for what comes and goes with every list.
+std::size_t with_spare(std::size_t rows) { return rows + rows / 32; }
+template <class View, class... Columns>
+void grow_list(View& view, const char* name, std::size_t rows, Columns... columns) {
+  if (!view.data() || view.extent(0) < rows) grow(view, name, with_spare(rows), columns...);
 }
 
 /// Positions and areas of bodies as they are at rest, behind so many vertices.
@@ -138,7 +144,6 @@ void Contact::make_arrays() {
   const int vertices = surface_.vertices;
   movable_ = last_value(surface_.first_vertex, surface_.cells);
   own_ = peers_ ? surface_.own_vertices : movable_;
-  grow(lists_.first, "first_item", vertices + 1);
   grow(lists_.first_group, "first_contact", vertices + 1);
   grow(listed_, "listed_x", vertices, 3);
   grow(side_, "own_side", vertices);
@@ -164,7 +169,8 @@ void Contact::take_workspace(bool ahead) {
   ahead_.item = Array<int>(parts.take<int>(groups), groups);
 }
 
-void Contact::make_bins(double width) {
+/// @param items  for so many there is room then
+ContactItems Contact::make_bins(double width, std::size_t items) {
   const TriangleBounds bounds = bounds_of_triangles(surface_);
   bins_.radius = bounds.radius;
   bins_.width = width + bounds.radius;
@@ -180,11 +186,13 @@ void Contact::make_bins(double width) {
     }
     if (count > most) bins_.width *= 1.3;
   } while (count > most);
-  const std::size_t starts = bins_.count() + 1, triangles = surface_.triangles;
-  Parts parts(workspace_->reserve(Parts::numbers<int>(starts) + Parts::numbers<int>(triangles)));
+  const std::size_t starts = bins_.count() + 1, triangles = surface_.triangles, vertices = surface_.vertices + 1;
+  Parts parts(workspace_->reserve(Parts::numbers<int>(starts) + Parts::numbers<int>(triangles) + Parts::numbers<int>(vertices) +
+                                  Parts::numbers<int>(items)));
   bins_.start = Array<int>(parts.take<int>(starts), starts);
   bins_.order = Array<int>(parts.take<int>(triangles), triangles);
   sort_triangles(surface_, bins_);
+  return {Array<int>(parts.take<int>(vertices), vertices), Array<int>(parts.take<int>(items), items)};
 }
 
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
@@ -198,17 +206,32 @@ void Contact::make_lists(double way, double dt) {
   if (skin_ >= 0) way = step_ways(surface_, listed_, 0, dt).whole;
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
-  make_bins(std::max(with_skin.other, with_skin.own));
-  const ContactSearch search{surface_, images_, bins_, rest_, with_skin};
-  lists_.items = countable_items(count_items(search, lists_));
-  grow(lists_.item, "items", lists_.items);
-  fill_items(search, lists_);
-  lists_.groups = number_groups(lists_, surface_.vertices);
-  grow(now_.item, "contact_item", lists_.groups);
-  grow(now_.gap, "contact_gap", lists_.groups);
-  grow(now_.weight, "contact_weight", lists_.groups, 3);
-  grow(now_.normal, "contact_normal", lists_.groups, 3);
+  const double width = std::max(with_skin.other, with_skin.own);
+  ContactItems items = make_bins(width, items_room_);
+  const auto count = [&] {
+    return static_cast<std::size_t>(countable_items(count_items({surface_, images_, bins_, rest_, with_skin}, items)));
+  };
+  if (std::size_t all = count(); all > items_room_) {  // seldom: what is in the workspace is lost where it grows
+    items_room_ = with_spare(all);
+    items = make_bins(width, items_room_);
+    count();
+  }
+  fill_lists({surface_, images_, bins_, rest_, with_skin}, items);
   ++report_.lists;
+}
+
+void Contact::fill_lists(const ContactSearch& search, const ContactItems& items) {
+  lists_.items = last_value(items.first, surface_.vertices);
+  fill_items(search, items, lists_);
+  lists_.groups = number_groups(lists_, surface_.vertices);
+  grow_list(lists_.first, "first_item", lists_.groups + 1);
+  grow_list(lists_.first_item, "lowest_item", lists_.groups);
+  grow_list(lists_.beyond, "items", lists_.items);
+  pack_items(surface_, items, lists_);
+  grow_list(now_.item, "contact_item", lists_.groups);
+  grow_list(now_.gap, "contact_gap", lists_.groups);
+  grow_list(now_.weight, "contact_weight", lists_.groups, 3);
+  grow_list(now_.normal, "contact_normal", lists_.groups, 3);
 }
 
 StepWays Contact::ways(double dt) const {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "contact/contact_law.hpp"
+#include "contact/contact_lists.hpp"
 #include "contact/contact_report.hpp"
 #include "contact/contact_views.hpp"
 #include "contact/keep_apart.hpp"
@@ -97,7 +98,8 @@ class Contact {
   std::string told_text(int first) const;
   StepWays ways(double dt) const;
   void make_lists(double way, double dt);
-  void make_bins(double width);
+  void fill_lists(const ContactSearch& search, const ContactItems& items);
+  ContactItems make_bins(double width, std::size_t items);
   void find(const ContactViews& contacts);
   Shortfall correct(double share, double least);
   void mend_crossings(double time_us, double dt);
@@ -117,6 +119,7 @@ class Contact {
   ContactReach reach_;  // without the skin
   ContactRest rest_;
   TriangleBins bins_;  // in the workspace, as lists are made
+  std::size_t items_room_ = 0;  // there, for items
   ContactLists lists_;
   ContactViews now_;      // at the positions of look()
   ContactViews ahead_;    // at those ahead; in the workspace

@@ -285,6 +285,7 @@ void ForceCoupling::hold_volume() {
     update_copies();
     loads_->limit_ahead();
   }
+  membranes_->forget_geometry();
 }
 
 void ForceCoupling::after_move(double time, double dt) {

@@ -44,9 +44,26 @@ void fill(const Array<int>& view, const std::vector<int>& values) {
   Kokkos::deep_copy(part, host);
 }
 
+/// At most eight, none so small that some of the threads would have nothing to do.
+/// @param first_vertex    [cell + 1]
+/// @param first_triangle  [cell + 1]
+std::vector<CellPart> cut(int cells, const std::vector<int>& first_vertex, const std::vector<int>& first_triangle) {
+  constexpr int most = 8, fewest_cells = 16, for_a_team = 8, most_teams = 128;
+  const int smallest = std::max(fewest_cells, for_a_team * std::min(Exec().concurrency(), most_teams));
+  const int count = std::max(1, std::min(most, cells / smallest));
+  std::vector<CellPart> parts;
+  for (int p = 0; p < count; ++p) {
+    const int first = static_cast<int>(static_cast<long>(cells) * p / count), last = static_cast<int>(static_cast<long>(cells) * (p + 1) / count);
+    parts.push_back({first, last - first, first_vertex[first], first_vertex[last] - first_vertex[first], first_triangle[first],
+                     first_triangle[last] - first_triangle[first]});
+  }
+  return parts;
+}
+
 }  // namespace
 
-void MembraneViscosity::hold(const MembraneViews& m) {
+void MembraneViscosity::hold(const MembraneViews& m, const std::vector<CellPart>& parts) {
+  parts_ = parts;
   extend(given_, "given_vertex", m.vertices);
   extend(past_, "past_vertex", m.vertices);
   extend(taken_, "taken_vertex", m.vertices);
@@ -113,14 +130,16 @@ void Membranes::make_room(const SurfaceSet& needed) {
   grow(start_x_, "start_x_vertex", views_.vertices, 3);
 }
 
-/// What is only of use within a call lies where others have such things in between: forces of corners, or directions. The triangles'
-/// geometry is kept there from compute_forces() on, until the forces are on their way.
+/// What is only of use within a call lies where others have such things in between: forces of a part's corners, or directions. The
+/// triangles' geometry is kept there from compute_forces() on, until the forces are on their way.
 void Membranes::take_workspace() {
   if (!workspace_) return;
   const std::size_t triangles = views_.triangles, vertices = views_.vertices;
+  std::size_t of_part = 0;
+  for_parts(views_, parts_, [&](const MembraneViews& part) { of_part = std::max<std::size_t>(of_part, part.triangles); });
   workspace_->keep(4 * triangles);
-  double* memory = workspace_->reserve(std::max(9 * triangles, 3 * vertices));
-  views_.corner_force = Table<double>(memory, triangles, 9);
+  double* memory = workspace_->reserve(std::max(9 * of_part, 3 * vertices));
+  views_.corner_force = Table<double>(memory, of_part, 9);
   motion_.direction = Components<double>(memory, vertices, 3);
   views_.triangle_geometry = Table<double>(workspace_->keep(4 * triangles), triangles, 4);
 }
@@ -166,7 +185,8 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   fill(set.number, number);
   fill(views_.type, type);
   if (set.bodies > 0) place_bodies(templates_, views_.type, set, 0, set.bodies);
-  if (viscosity_) viscosity_->hold(views_);
+  parts_ = cut(own, first_vertex, first_triangle);
+  if (viscosity_) viscosity_->hold(views_, parts_);
   describe_cells(cells, own);
   stiffness_.clear();
   elasticity_ = make_elasticity(types_, type_of_own);

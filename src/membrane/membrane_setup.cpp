@@ -32,11 +32,12 @@ Array<Law> constants(const std::vector<CellReference>& types) {
 
 /// @param law  whose kind counts
 template <class Cells>
-std::unique_ptr<Elasticity> elasticity_of(const MembraneLaw& law, const std::vector<CellReference>& types, const Cells& cells) {
+std::unique_ptr<Elasticity> elasticity_of(const MembraneLaw& law, const std::vector<CellReference>& types, const Cells& cells,
+                                          const std::vector<int>& listed = {}) {
   return std::visit(
       [&](const auto& one) -> std::unique_ptr<Elasticity> {
         using Law = std::decay_t<decltype(one)>;
-        return std::make_unique<ElasticityOf<Law, Cells>>(constants<Law>(types), cells);
+        return std::make_unique<ElasticityOf<Law, Cells>>(constants<Law>(types), cells, listed);
       },
       law);
 }
@@ -104,7 +105,7 @@ std::unique_ptr<Elasticity> make_elasticity(const std::vector<CellReference>& ty
   for (const auto& [law, cells] : cells_of) {
     const MembraneLaw& one = types[type_of_cell[cells[0]]].in_plane;
     if (cells_of.size() == 1) return elasticity_of(one, types, AllCells{int(cells.size())});
-    parts.push_back(elasticity_of(one, types, ListedCells{to_device("cells_law", cells), int(cells.size())}));
+    parts.push_back(elasticity_of(one, types, ListedCells{to_device("cells_law", cells), int(cells.size())}, cells));
   }
   return std::make_unique<MixedElasticity>(std::move(parts));
 }

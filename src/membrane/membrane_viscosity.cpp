@@ -17,9 +17,13 @@ auto label(const char* name) { return uninitialised(std::string("corpuscle::memb
 }  // namespace
 
 std::size_t MembraneViscosity::scratch_numbers(const MembraneViews& m) const {
-  const std::size_t entries = 3 * static_cast<std::size_t>(m.triangles);
   const std::size_t numbers = (given_.data() ? 4 : 1) + 3 + (band_.teams > 0 ? 0 : 6 + 4 * 3);  // of each vertex, as divided below
-  return entries + (entries + 1) / 2 + numbers * static_cast<std::size_t>(m.vertices);
+  std::size_t most = 0;
+  for_parts(m, parts_, [&](const MembraneViews& part) {
+    const std::size_t entries = 3 * static_cast<std::size_t>(part.triangles);
+    most = std::max(most, entries + (entries + 1) / 2 + numbers * static_cast<std::size_t>(part.vertices));
+  });
+  return most;
 }
 
 /// A cell of n vertices takes about n^2 operations in a factorisation, and about as many in conjugate gradients, which take four times
@@ -55,7 +59,7 @@ void MembraneViscosity::prepare(const std::vector<CellReference>& types) {
 void MembraneViscosity::make_room(const MembraneViews& m) {
   scratch_ = Array<double>(label("viscous_scratch"), scratch_numbers(m));
   divide_scratch(m, scratch_.data());
-  views_.right_side = Components<double>(label("right_side_vertex"), m.vertices, 3);
+  views_.right_side = {Components<double>(label("right_side_vertex"), m.vertices, 3)};
   views_.iterations = Array<int>("corpuscle::membrane::iterations_cell", m.cells);
 }
 
@@ -66,15 +70,16 @@ void MembraneViscosity::divide_scratch(const MembraneViews& m, double* memory) {
     memory += numbers;
     return from;
   };
-  views_.inverse_length = Array<double>(take(entries), entries);
-  views_.neighbour = Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries);
-  views_.diagonal = Array<double>(take(vertices), vertices);
-  views_.gradient = Components<double>(take(3 * vertices), vertices, 3);
-  if (given_.data()) views_.right_side = Components<double>(take(3 * vertices), vertices, 3);
+  const int first_entry = 3 * m.first_triangle;
+  const auto take_vectors = [&] { return RowsFrom<Components<double>>{Components<double>(take(3 * vertices), vertices, 3), m.first_vertex}; };
+  views_.inverse_length = {Array<double>(take(entries), entries), first_entry};
+  views_.neighbour = {Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries), first_entry};
+  views_.diagonal = {Array<double>(take(vertices), vertices), m.first_vertex};
+  views_.gradient = take_vectors();
+  if (given_.data()) views_.right_side = take_vectors();
   if (band_.teams > 0) return;
-  views_.block = Table<double>(take(6 * vertices), vertices, 6);
-  for (auto* vectors : {&views_.residual, &views_.search, &views_.image, &views_.inverse_gradient})
-    *vectors = Components<double>(take(3 * vertices), vertices, 3);
+  views_.block = {Table<double>(take(6 * vertices), vertices, 6), m.first_vertex};
+  for (auto* vectors : {&views_.residual, &views_.search, &views_.image, &views_.inverse_gradient}) *vectors = take_vectors();
 }
 
 void MembraneViscosity::force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
@@ -113,36 +118,46 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction&
 
 void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead,
                                const Components<double>& force) {
-  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
-  resist_with(m, {beta, share_, ahead, m.surface.v, given_, force, past_}, taken_);
+  double* const memory = workspace.reserve(scratch_numbers(m));
+  for_parts(m, parts_, [&](const MembraneViews& part) {
+    divide_scratch(part, memory);
+    resist_with(part, {beta, share_, ahead, m.surface.v, given_, force, past_}, taken_);
+  });
   copy_vertices(m.vertices, force, given_);
 }
 
 void MembraneViscosity::relieve(const MembraneViews& m, Workspace& workspace, double beta, const StiffnessViews& work) {
-  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
+  double* const memory = workspace.reserve(scratch_numbers(m));
   MembraneViews at_rest = m;
   at_rest.force = work.mode;
   at_rest.surface.v = work.force_ahead;
   Kokkos::deep_copy(work.force_ahead, 0.0);
   Kokkos::deep_copy(work.force_behind, 0.0);
-  resist_with(at_rest, {beta, share_, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, work.probe);
+  for_parts(at_rest, parts_, [&](const MembraneViews& part) {
+    divide_scratch(part, memory);
+    resist_with(part, {beta, share_, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, work.probe);
+  });
   Kokkos::deep_copy(taken_, 0.0f);  // nothing has been taken off any force yet
 }
 
 template <class Damping>
-void MembraneViscosity::damp_with(const MembraneViews& m, const StiffnessViews& work) const {
-  assemble_viscous<Damping>(m, views_, FluidReaction{1, 0, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, 1);
-  damp_mode<Damping>(m, views_, work);
+void MembraneViscosity::damp_with(const MembraneViews& part, const StiffnessViews& work) const {
+  assemble_viscous<Damping>(part, views_, FluidReaction{1, 0, 0, work.force_ahead, work.force_behind, work.mode, work.force_behind}, 1);
+  damp_mode<Damping>(part, views_, work);
 }
 
 void MembraneViscosity::damp(const MembraneViews& m, Workspace& workspace, const StiffnessViews& work) {
-  divide_scratch(m, workspace.reserve(scratch_numbers(m)));
+  double* const memory = workspace.reserve(scratch_numbers(m));
   Kokkos::deep_copy(work.force_ahead, 0.0);
   Kokkos::deep_copy(work.force_behind, 0.0);
-  if (tangential_)
-    damp_with<FullDamping>(m, work);
-  else
-    damp_with<CentralDamping>(m, work);
+  for_parts(m, parts_, [&](const MembraneViews& part) {
+    divide_scratch(part, memory);
+    if (tangential_)
+      damp_with<FullDamping>(part, work);
+    else
+      damp_with<CentralDamping>(part, work);
+  });
+  copy_vertices(m.vertices, work.probe, work.mode);
 }
 
 double MembraneViscosity::dissipation(const MembraneViews& m) const {

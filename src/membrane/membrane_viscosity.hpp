@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "core/workspace.hpp"
 #include "membrane/elasticity.hpp"
@@ -15,8 +16,9 @@ class MembraneViscosity {
  public:
   explicit MembraneViscosity(bool tangential);
   /// Memory for these membranes; hold(): for those that a rank holds at present, which move with the fluid.
+  /// @param parts  of the cells, which are dealt with one after the other
   void make_room(const MembraneViews& m);
-  void hold(const MembraneViews& m);
+  void hold(const MembraneViews& m, const std::vector<CellPart>& parts);
   /// Before hold(): matrices of these are factorised, unless they are too large for that.
   void prepare(const std::vector<CellReference>& types);
   /// [vertex, 3] nN, that membranes which move with the fluid gave it in their last step, and what FluidReaction needs of the one
@@ -59,6 +61,7 @@ class MembraneViscosity {
   int iterations() const;
 
  private:
+  /// Of the largest part.
   std::size_t scratch_numbers(const MembraneViews& m) const;
   void divide_scratch(const MembraneViews& m, double* memory);
   /// @param m  whose velocities are U and become v  @param damping  [vertex, 3] becomes D v
@@ -68,12 +71,13 @@ class MembraneViscosity {
   void resist_with(const MembraneViews& m, const FluidReaction& fluid, const Taken& damping) const;
 
   template <class Damping>
-  void damp_with(const MembraneViews& m, const StiffnessViews& work) const;
+  void damp_with(const MembraneViews& part, const StiffnessViews& work) const;
 
   bool tangential_;
   double share_ = 0;
   Components<double> given_, past_;  // [vertex, 3] nN; only with hold()
   Components<float> taken_;   // [vertex, 3] nN, what the last resist() took off, of which only the power is told; only with hold()
+  std::vector<CellPart> parts_;  // only with hold(): else all cells at once
   Array<double> scratch_;     // without hold(): else it lies in the workspace
   ViscosityViews views_;
   ViscousBand band_;  // without teams: conjugate gradients

@@ -100,7 +100,7 @@ void Membranes::estimate_stiffness() {
   take_workspace();
   const StiffnessViews work = make_stiffness_views(views_);
   const Array<double> eigenvalue(uninitialised("corpuscle::membrane::eigenvalue_cell"), views_.cells);
-  largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue);
+  largest_stiffness(views_, *elasticity_, work, power_iterations, eigenvalue, parts_);
   forget_geometry();
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), eigenvalue);
   stiffness_.assign(host.data(), host.data() + views_.cells);
@@ -144,7 +144,7 @@ void Membranes::compute_forces() {
   if (views_.cells == 0) return;
   take_workspace();
   Kokkos::deep_copy(views_.status, 0);
-  elasticity_->membrane_forces(views_, views_.surface.x, views_.force);
+  elasticity_->membrane_forces(views_, views_.surface.x, views_.force, parts_);
   if (const int cell = trouble(); cell >= 0) explain(cell, 0);
 }
 
@@ -240,6 +240,7 @@ void Membranes::drift(double dt) {
 
 double Membranes::volume_taken() {
   if (views_.cells == 0) return 0;
+  take_workspace();  // which others have had in between
   measure_membranes(views_, views_.surface.x);
   return largest_volume_change(views_, motion_);
 }
@@ -249,6 +250,7 @@ void Membranes::give_volume_back() {
   take_workspace();
   measure_drift(views_, motion_);
   corpuscle::give_volume_back(views_, motion_);
+  forget_geometry();
 }
 
 void Membranes::limit_volume(double share) {
@@ -281,10 +283,10 @@ double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const st
 template <class Answer>
 double Membranes::largest_response(const MobilityModel& model, const std::vector<int>& cells, const Answer& answer) {
   take_geometry();
-  const StiffnessViews work = make_stiffness_views(views_);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
-  start_mode(views_, work);
+  const StiffnessViews work = make_stiffness_views(up_to_last);
+  start_mode(up_to_last, work);
   for (int i = 0; i < power_iterations; ++i) {
     answer(up_to_last, work);
     for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
@@ -311,11 +313,11 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
   constexpr double distance = 1e-4;  // um, as for the stiffness
   const bool viscous = viscosity_ && workspace_ && beta > 0;
   return largest_response(model, cells, [&](const MembraneViews& up_to_last, const StiffnessViews& work) {
-    displace(views_, work, distance);
-    elasticity_->membrane_forces(views_, work.probe, work.force_ahead);
-    displace(views_, work, -distance);
-    elasticity_->membrane_forces(views_, work.probe, work.force_behind);
-    difference_forces(views_, work, distance);
+    displace(up_to_last, work, distance);
+    elasticity_->membrane_forces(up_to_last, work.probe, work.force_ahead, parts_);
+    displace(up_to_last, work, -distance);
+    elasticity_->membrane_forces(up_to_last, work.probe, work.force_behind, parts_);
+    difference_forces(up_to_last, work, distance);
     if (!viscous) return;
     viscosity_->relieve(up_to_last, *workspace_, beta, work);
     take_workspace();

@@ -225,6 +225,7 @@ class Membranes {
   std::vector<CellReference> types_;
   SurfaceSet templates_;                         // one body for each type; only with hold()
   std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
+  std::vector<CellPart> parts_;                  // for what takes memory for one part at a time; only with hold()
   std::vector<int> number_;                      // [cell] in the whole scene
   CellNames names_;
   std::vector<bool> holds_area_;                 // [cell]

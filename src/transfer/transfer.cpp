@@ -115,6 +115,8 @@ Transfer::Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, 
   beyond_host_ = HostCopy(places_.beyond);
   markers_.start = make<Array<int>>("cell_start", cells + 1);
   markers_.near = make<Array<unsigned char>>("cell_near", cells);
+  first_of_plane_ = make<Array<int>>("first_of_plane", block_.index().padded(2) + 1);
+  first_of_plane_host_ = HostCopy(first_of_plane_);
   make_places(vertices);
 }
 
@@ -138,29 +140,46 @@ void Transfer::make_room(int markers) {
     room_ = markers + markers / 64 + 1;
     markers_.vertex = make<Array<int>>("marker_vertex", room_);
     markers_.home = make<Array<unsigned char>>("marker_home", room_);
-    markers_.base = make<Table<short>>("marker_base", room_, 6);
     markers_.order = make<Array<int>>("marker_order", room_);
   }
 }
 
-/// The markers' weights, which no one needs who has the workspace before.
-/// @param more  numbers that are wanted beside them  @returns where those are; null if the weights were there
-double* Transfer::weigh(std::size_t more) {
-  if (weighed_) return nullptr;
-  weighed_ = true;
-  int points = 0;
-  with_kernel([&](auto delta) { points = decltype(delta)::points; });
-  const auto rows = static_cast<std::size_t>(markers_.count);
+/// A quarter of all, but so many that the markers which reach several of the parts are not too many, and no thread goes without.
+int Transfer::planes_at_once() const {
+  constexpr int parts = 4, fewest = 6;
+  const int planes = block_.rows(2, true), cells = block_.rows(0, true) * block_.rows(1, true);
+  return std::max({fewest, (planes + parts - 1) / parts, Exec().concurrency() / cells});
+}
+
+/// use(planes) for all of the block's cells and faces, some planes at a time, of which the markers that reach them have rows then.
+template <class Delta, class Use>
+void Transfer::for_planes(const Use& use) {
+  constexpr int points = Delta::points, halo = IndexSpace::halo;
+  const int planes = block_.rows(2, true), at_once = planes_at_once();
+  if (!marked_) {
+    mark_near<Delta>(block_, markers_);
+    first_of_planes(block_.index(), markers_, first_of_plane_);
+  }
+  const auto& first = first_of_plane_host_.read();
+  marked_ = true;
+  const auto below = [&](int plane) { return first(plane + MarkerReach<Delta>::below + halo); };
+  const auto above = [&](int plane) { return first(plane + MarkerReach<Delta>::above + halo); };
+  std::size_t most = 1;
+  for (int begin = 0; begin < planes; begin += at_once)
+    most = std::max<std::size_t>(most, above(std::min(begin + at_once, planes)) - below(begin));
   const std::size_t dipoles = ratios_.empty() ? 0 : 3;
-  double* memory = workspace_->reserve((6 * points + 3 + dipoles) * rows + more);
-  markers_.weight = Table<double>(memory, rows, 6 * points);
-  markers_.across = Table<double>(memory + 6 * points * rows, rows, 3);
-  markers_.dipole = Table<double>(memory + (6 * points + 3) * rows, dipoles > 0 ? rows : 0, dipoles);
-  with_kernel([&](auto delta) {
-    prepare_markers<decltype(delta)>(block_, markers_);
-    mark_near<decltype(delta)>(block_, markers_);
-  });
-  return memory + (6 * points + 3 + dipoles) * rows;
+  double* const memory = workspace_->reserve((6 * points + 3 + dipoles) * most + (6 * most * sizeof(short) + sizeof(double) - 1) / sizeof(double));
+  markers_.weight = Table<double>(memory, most, 6 * points);
+  markers_.across = Table<double>(memory + 6 * points * most, most, 3);
+  markers_.dipole = Table<double>(memory + (6 * points + 3) * most, dipoles > 0 ? most : 0, dipoles);
+  markers_.base = Table<short>(reinterpret_cast<short*>(memory + (6 * points + 3 + dipoles) * most), most, 6);
+  for (int begin = 0; begin < planes; begin += at_once) {
+    const int end = std::min(begin + at_once, planes);
+    markers_.first = below(begin);
+    markers_.rows = above(end) - below(begin);
+    prepare_markers<Delta>(block_, markers_);
+    use(Planes{begin, end});
+  }
 }
 
 int Transfer::place(const Components<double>& x) {
@@ -172,7 +191,7 @@ int Transfer::place(const Components<double>& x) {
   markers_.xi = places_.xi;
   fill_markers(search_, markers_);
   sort_markers(block_.lattice, markers_);
-  weighed_ = false;
+  marked_ = false;
   const int beyond = beyond_host_.read()(0);
   return beyond < no_vertex ? beyond : -1;
 }
@@ -217,20 +236,22 @@ void Transfer::spread(const Components<double>& force, const SurfaceSet& surface
 
 /// @param surface  null where there is no more to them
 void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* surface, const SlipViews* slip) {
-  weigh();
   const bool sharp = moment_ > 0;
   const FaceForce spread = sharp ? FaceForce{{raw_[0], raw_[1], raw_[2]}} : faces_;
   with_kernel([&](auto delta) {
-    if (slip && !ratios_.empty()) {
-      resolve_kinked_forces<decltype(delta)>(block_, *slip, markers_, force);
-      for (int d = 0; d < 3; ++d) {  // one by one, for the memory
-        resolve_dipoles<decltype(delta)>(block_, *slip, markers_, force, d);
-        spread_dipoles<decltype(delta)>(block_, markers_, d, spread.across[d]);
+    using Delta = decltype(delta);
+    for_planes<Delta>([&](const Planes& planes) {
+      if (slip && !ratios_.empty()) {
+        resolve_kinked_forces<Delta>(block_, *slip, markers_, force);
+        for (int d = 0; d < 3; ++d) {  // one by one, for the memory
+          resolve_dipoles<Delta>(block_, *slip, markers_, force, d);
+          spread_dipoles<Delta>(block_, markers_, planes, d, spread.across[d]);
+        }
+      } else {
+        resolve_forces<Delta>(block_, markers_, force);
+        spread_forces<Delta>(block_, markers_, planes, spread);
       }
-    } else {
-      resolve_forces<decltype(delta)>(block_, markers_, force);
-      spread_forces<decltype(delta)>(block_, markers_, spread);
-    }
+    });
   });
   for (int d = 0; d < 3 && sharp; ++d) {
     grid_->halo().exchange(raw_[d]);
@@ -261,7 +282,6 @@ void Transfer::add_pressure_jumps(const SurfaceSet& surface) {
 
 void Transfer::interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
                            const Components<double>& velocity) {
-  weigh();
   Kokkos::deep_copy(Exec(), velocity, 0.0);
   const bool sharp = moment_ > 0;
   for (int d = 0; d < 3 && sharp; ++d) {
@@ -279,9 +299,8 @@ void Transfer::interpolate(const Array<double> (&flux)[3], const Components<doub
 
 /// What vertices have of the sides' velocities is what they have where all fluxes are zero.
 double Transfer::power_on_sides(const Components<double>& force, const Components<double>& u, const SlipViews* slip) {
-  weighed_ = false;
   const std::size_t vertices = places_.vertices;
-  const Components<double> of_sides(weigh(3 * vertices), vertices, 3);
+  const Components<double> of_sides(workspace_->reserve(3 * vertices), vertices, 3);
   const bool sharp = moment_ > 0;
   for (int d = 0; d < 3; ++d) {
     if (!raw_[d].data()) raw_[d] = Array<double>("corpuscle::transfer::raw_face", block_.index().size());
@@ -303,7 +322,6 @@ void Transfer::slip_between(const std::vector<double>& ratios) {
   const auto host = Kokkos::create_mirror_view(ratio_);
   std::copy(ratios.begin(), ratios.end(), host.data());
   Kokkos::deep_copy(ratio_, host);
-  weighed_ = false;
 }
 
 SlipLaw Transfer::law_of_slip() const {

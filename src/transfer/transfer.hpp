@@ -18,7 +18,7 @@ class Transfer {
  public:
   /// @param boundaries  one entry per side
   /// @param vertices    how many place() is called with
-  /// @param workspace   shared with others that do not use it between spread() and interpolate()
+  /// @param workspace   shared with others that do not use it in the calls below
   Transfer(Grid& grid, const std::vector<BoundarySettings>& boundaries, CouplingSettings::Kernel kernel, int vertices,
            std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>());
 
@@ -82,7 +82,9 @@ class Transfer {
   void spread_rest(const Components<double>& force, const SurfaceSet* surface, const SlipViews* slip);
   void make_places(int vertices);
   void make_room(int markers);
-  double* weigh(std::size_t more = 0);
+  int planes_at_once() const;
+  template <class Delta, class Use>
+  void for_planes(const Use& use);
   template <class Use>
   void with_kernel(const Use& use) const;
 
@@ -95,7 +97,9 @@ class Transfer {
   MarkerViews markers_;
   std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
-  bool weighed_ = false;  // the markers have their weights, in the workspace
+  bool marked_ = false;   // cells near markers are, and the planes' first markers known
+  Array<int> first_of_plane_;
+  HostCopy<Array<int>> first_of_plane_host_;
   double largest_spacing_ = 0;
   FaceForce faces_;
   std::vector<double> ratios_;            // of slip_between()

@@ -485,3 +485,60 @@ TEST_CASE("on which side of a sharp fold a point is does not depend on which of 
   CHECK(by_features == 0);
   CHECK(by_triangles > 50);  // what it is there for
 }
+
+namespace {
+
+/// A sphere of so many triangles that those next to each other are more than 16 bits apart: one half of every quadrangle comes first.
+TriangleMesh large_sphere(double radius, int around, int along) {
+  TriangleMesh mesh;
+  const double pi = std::acos(-1.0);
+  mesh.vertices = {{0, 0, radius}, {0, 0, -radius}};
+  for (int i = 1; i < along; ++i)
+    for (int j = 0; j < around; ++j) {
+      const double theta = pi * i / along, phi = 2 * pi * j / around;
+      mesh.vertices.push_back({radius * std::sin(theta) * std::cos(phi), radius * std::sin(theta) * std::sin(phi), radius * std::cos(theta)});
+    }
+  const auto number = [&](int i, int j) { return 2 + (i - 1) * around + j % around; };
+  for (int half = 0; half < 2; ++half)
+    for (int i = 1; i < along - 1; ++i)
+      for (int j = 0; j < around; ++j) {
+        const int a = number(i, j), b = number(i + 1, j), c = number(i + 1, j + 1), d = number(i, j + 1);
+        mesh.triangles.push_back(half == 0 ? std::array<int, 3>{a, b, c} : std::array<int, 3>{a, c, d});
+      }
+  for (int j = 0; j < around; ++j) {
+    mesh.triangles.push_back({0, number(1, j), number(1, j + 1)});
+    mesh.triangles.push_back({1, number(along - 1, j + 1), number(along - 1, j)});
+  }
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("of a body with more triangles than 16 bits count a vertex has one nearest point", "[contact]") {
+  const double radius = 4, range = 0.3, gap = 0.1;
+  const TriangleMesh large = large_sphere(radius, 360, 190);
+  REQUIRE(large.triangles.size() > 2 * 65536);
+  SurfaceSet set = make_surface_set({sphere_mesh(2, {radius + 2 + gap, 0, 0}, 0.4), large}, 1);
+  Contact contact(settings(range), set, Images{}, mu, 0);
+  contact.look_at_start(dt);
+  const auto first = on_host(contact.lists().first_group), first_item = on_host(contact.lists().first_item);
+  const auto item = on_host(contact.contacts().item);
+  const auto of = on_host(contact.contacts().gap);
+  const auto x = on_host(set.x);
+  int near = 0;
+  bool cut = false;
+  for (int v = 0; v < set.own_vertices; ++v) {
+    const double away = norm(load(x, v)) - radius;
+    int found = 0;
+    for (int g = first(v); g < first(v + 1); ++g) {
+      cut = cut || (g > first(v) && first_item(g) - first_item(g - 1) > 65535);
+      if (item(g) < 0) continue;
+      ++found;
+      CHECK(std::abs(of(g) - away) < 5e-4);  // triangles of 0.07 um are so far from the sphere
+    }
+    if (away < range - 1e-3) CHECK(found == 1);
+    near += found;
+  }
+  CHECK(cut);
+  CHECK(near > 3);
+}
