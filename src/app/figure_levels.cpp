@@ -34,10 +34,11 @@ constexpr FigureLevel levels[] = {
     {"splitting", 5e-3, false, Of::speed, "time.step_us",
      "the pressure lags behind the flow, and forces with it: reduce time.step_us, and set time.first_step_us for short steps where "
      "the flow changes"},
+    // The mean over the run's time, as the splitting: in the first steps of a sudden start the flow has yet to reach the surfaces.
     // 0.05 to 0.11 where the drag is right within 1 %, 0.16 to 0.33 where it is off by 1.4 to 12 %. Past a sphere in
     // a periodic box 0.23, 0.13 and 0.09 with 7, 10 and 13 nodes a diameter, where the drag is 2.5, 1.3 and 0.6 % high.
     {"slip", 0.15, false, Of::speed, "grid.nodes",
-     "the flow does not follow the surfaces, by that share of the largest speed: refine grid.nodes, forces and shapes are not resolved"},
+     "the flow does not follow the surfaces, by that share of the largest speed on average: refine grid.nodes, forces and shapes are not resolved"},
     // Between two surfaces the drag is off by 6 % with a gap of 3.4 spacings, by 12 % with 2.4.
     {"least_wall_spacings", 2, true, Of::itself, "grid.nodes",
      "so few grid spacings between a surface and a wall, an inlet or a symmetry side do not resolve the flow between them: refine grid.nodes"},

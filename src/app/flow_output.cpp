@@ -1,5 +1,6 @@
 #include "app/flow_output.hpp"
 
+#include "app/figure_levels.hpp"
 #include "cells/cell_state.hpp"
 #include "common/extremes.hpp"
 #include "core/error.hpp"
@@ -96,7 +97,8 @@ void FlowOutput::sample_flow() {
   const bool regular = step <= first || step % every == 0;
   if (!regular && !simulation_.done() && !simulation_.at_outflow()) return;
   const FlowSample sample{simulation_.time(), simulation_.fluid().splitting(),
-                          simulation_.immersed() ? simulation_.immersed()->slip()[1] : 0.0};
+                          simulation_.immersed() ? simulation_.immersed()->slip()[1] : 0.0,
+                          larger(simulation_.fluid().statistics().speed, speed_at_rest)};
   if (regular)
     totals_.add(sample);
   else

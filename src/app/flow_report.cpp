@@ -77,7 +77,8 @@ void report_search(FlowSimulation& simulation, const RunTotals& now, Report& rep
   if (!simulation.immersed()) return;
   auto& errors = report.errors;
   // Of the flow's own speed, prescribed or computed: the solvers' reference may be that of a membrane's return to its shape.
-  errors["slip"] = now.slip_speed / std::max({simulation.fluid().boundaries().largest_speed(), now.speed, speed_at_rest});
+  errors["slip"] = now.slip();
+  errors["slip_max"] = now.slip_speed / std::max({simulation.fluid().boundaries().largest_speed(), now.speed, speed_at_rest});
   const auto& search = now.immersed;
   report.extra["immersed"] = {{"classifications", search.classifications},
                               {"immersed_nodes", search.immersed},

@@ -18,7 +18,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, d
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ContactReport, crossings, limited, smallest_gap, smallest_own_gap, smallest_wall_gap,
                                                 smallest_body_gap, lists)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
-                                   volume_drift, area_drift, speed, slip_speed, splitting_us,
+                                   volume_drift, area_drift, speed, slip_speed, slip_um, way_um, splitting_us,
                                    splitting_until_us, splitting_max, immersed, contact, energy, blood, wall_s, wall_s_by_part)
 
 namespace {
@@ -33,7 +33,10 @@ void read_nulls(nlohmann::json& value) {
 }  // namespace
 
 void RunTotals::add(const FlowSample& sample) {
-  splitting_us += sample.splitting * (sample.time_us - splitting_until_us);
+  const double since = sample.time_us - splitting_until_us;
+  splitting_us += sample.splitting * since;
+  slip_um += sample.slip_speed * since;
+  way_um += sample.speed * since;
   splitting_until_us = sample.time_us;
   splitting_max = larger(splitting_max, sample.splitting);
   slip_speed = larger(slip_speed, sample.slip_speed);
@@ -49,8 +52,10 @@ RunTotals totals_from(const std::string& text) {
   try {
     auto json = nlohmann::json::parse(text);
     read_nulls(json);
+    for (const char* later : {"slip_um", "way_um"})  // than checkpoints that are still read
+      if (json.is_object() && !json.contains(later)) json[later] = 0.0;
     auto totals = json.get<RunTotals>();
-    totals.widest = json.value("widest", 0);  // earlier checkpoints do not have it
+    totals.widest = json.value("widest", 0);
     return totals;
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("'totals' is damaged: {}", error.what()));

@@ -11,7 +11,8 @@ namespace corpuscle {
 
 /// Figures of one step that are not taken after each.
 struct FlowSample {
-  double time_us = 0, splitting = 0, slip_speed = 0;  // slip in um/us
+  double time_us = 0, splitting = 0;
+  double slip_speed = 0, speed = 0;  // um/us, the largest at a surface and of the flow
 };
 
 struct RunTotals {
@@ -21,6 +22,7 @@ struct RunTotals {
   double splitting_us = 0, splitting_until_us = 0, splitting_max = 0;  // integral over time until then, from the sampled steps
   double speed = 0;                                                    // um/us, the largest at a node so far
   double slip_speed = 0;                                               // um/us, the largest of the sampled steps
+  double slip_um = 0, way_um = 0;                                      // integrals over time of slip and flow, from the same
   ImmersedReport immersed;
   ContactReport contact;
   EnergyBalance::State energy;
@@ -30,6 +32,8 @@ struct RunTotals {
 
   /// A sample stands for the time since the one before it.
   void add(const FlowSample& sample);
+  /// Mean slip over the mean speed of the flow: a start from rest, or a pause, is a small part of both.
+  double slip() const { return way_um <= 0 ? 0 : slip_um / way_um; }
 };
 
 /// As text for a checkpoint: every number with all its digits.

@@ -161,6 +161,53 @@ void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>
   if (std::abs(worst) > balanced * most) refuse_net_flux(boundaries, sides, when, worst);
 }
 
+namespace {
+
+/// The fastest that two opposite walls move past each other, um/us; other sides hold no fluid back.
+double passing_speed(const BoundarySettings& a, const BoundarySettings& opposite, const std::vector<double>& times) {
+  const auto at = [](const BoundarySettings& s, double time) {
+    if (s.type != Type::moving_wall) return Vec3{};
+    const Triple& v = *s.velocity;
+    return time_factor(s, time) * Vec3{v[0], v[1], v[2]};
+  };
+  if (opposite.type != Type::wall && opposite.type != Type::moving_wall) return 0;
+  double fastest = 0;
+  for (const double time : times) fastest = std::max(fastest, norm(at(a, time) - at(opposite, time)));
+  return fastest;
+}
+
+}  // namespace
+
+std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettings>& boundaries, double step_us) {
+  constexpr double much = 0.5, most = 2;
+  const auto moves = [](const BoundarySettings& s) { return s.type == Type::moving_wall; };
+  if (std::none_of(boundaries.begin(), boundaries.end(), moves)) return "";
+  const auto sides = measure_sides(grid, boundaries);
+  const auto times = corners_in_time(boundaries);
+  double worst = 0, speed = 0, apart = 0;
+  std::size_t wall = 0;
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    if (!moves(boundaries[b])) continue;
+    const int beyond = static_cast<int>(boundaries[b].side) ^ 1;
+    const auto faces = [&](const BoundarySettings& s) { return static_cast<int>(s.side) == beyond; };
+    const auto opposite = std::find_if(boundaries.begin(), boundaries.end(), faces);
+    if (opposite == boundaries.end()) continue;
+    const double distance = 2 * grid.total_volume() / (sides[b].area + sides[opposite - boundaries.begin()].area);
+    const double past = passing_speed(boundaries[b], *opposite, times);
+    if (past * step_us / distance > worst) worst = past * step_us / distance, speed = past, apart = distance, wall = b;
+  }
+  if (!(worst > much)) return "";
+  const Triple& v = *boundaries[wall].velocity;
+  const std::string text = fmt::format(
+      "boundary.{}.velocity_mm_per_s = [{:.4g}, {:.4g}, {:.4g}]: {} moves past the opposite side, {:.3g} um away, with {:.4g} mm/s, which "
+      "strains the fluid and the cells in it by {:.3g} in a step of {:g} us; {:g} is the most that a cell follows well, more than {:g} "
+      "is refused: lower boundary.{}.velocity_mm_per_s (is it in mm/s?), or reduce time.step_us to {:.2g} us or less",
+      wall, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[wall].side), apart,
+      speed / units::mm_per_s, worst, step_us, much, most, wall, 0.98 * step_us * much / worst);
+  if (worst > most) throw InputError(text);
+  return text;
+}
+
 void check_pressure_gradient(const Grid& grid, const Triple& gradient) {
   constexpr double rounding = 1e-3;  // of the gradient: coordinates and gradients are given with a few digits
   const Vec3 g{gradient[0], gradient[1], gradient[2]};

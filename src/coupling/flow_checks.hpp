@@ -10,6 +10,11 @@ namespace corpuscle {
 ///                     and what comes in differs from what goes out at some time (naming the sides, the flux and the time)
 void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>& boundaries);
 
+/// What walls that move past the opposite side strain the fluid between them by in a step, and with it the cells.
+/// @returns the warning, of more than 0.5, or ""
+/// @throws InputError  beyond 2: a cell is torn before the next forces on it
+std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettings>& boundaries, double step_us);
+
 /// @param gradient  imposed, in any unit
 /// @throws InputError  for one with a part across the shifts between the grid's periodic sides, which drives nothing
 void check_pressure_gradient(const Grid& grid, const Triple& gradient);

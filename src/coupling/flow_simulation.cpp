@@ -1,6 +1,7 @@
 #include "coupling/flow_simulation.hpp"
 
 #include "core/error.hpp"
+#include "core/log.hpp"
 #include "coupling/flow_checks.hpp"
 
 #include <fmt/format.h>
@@ -38,6 +39,8 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   const auto scope = timers_.scope("set-up");
   grid_ = std::make_unique<Grid>(comm, make_node_source(*scene.grid), periodic_directions(scene.boundaries));
   check_prescribed_flow(*grid_, scene.boundaries);
+  if (scene.has_cells())
+    if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back()); !text.empty()) warn("{}", text);
   check_courses(scene.boundaries, schedule_);
   check_pressure_gradient(*grid_, scene.fluid->pressure_gradient_Pa_per_um);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);

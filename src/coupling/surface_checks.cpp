@@ -123,11 +123,13 @@ constexpr Limits force_limits{0.5, 1.0};
 /// @returns the warning, or ""
 std::string check_resolution(const std::string& name, const GridSettings& grid, const Resolution& r, const Limits& limits) {
   if (!(r.typical > limits.coarse)) return "";
+  int digits = 2;  // that tell the figure from the limit
+  while (digits < 6 && fmt::format("{:.{}g}", r.typical, digits) == fmt::format("{:.{}g}", limits.coarse, digits)) ++digits;
   const std::string text = fmt::format(
       "{}: the grid is too coarse for it: nodes are {:.3g} um apart across it where it is {:.3g} um thick; spacing over thickness is "
-      "{:.2g} there, and {:.2g} or more over half of its surface, where {:.2g} is enough for a first look and half of that for "
-      "figures: use {} or finer",
-      name, r.spacing_um, r.thickness_um, r.largest, r.typical, limits.coarse, finer_nodes(grid, r, r.typical / limits.coarse));
+      "{:.{}g} there, and {:.{}g} or more over half of its surface, where no more than {:g} will do for a first look and half of that "
+      "for figures: use {} or finer",
+      name, r.spacing_um, r.thickness_um, r.largest, digits, r.typical, digits, limits.coarse, finer_nodes(grid, r, r.typical / limits.coarse));
   if (r.typical > limits.hopeless) throw InputError(text);
   return text;
 }

@@ -14,6 +14,7 @@
 #include "input/case_file.hpp"
 #include "input/overrides.hpp"
 #include "input/sections.hpp"
+#include "input/unusual_values.hpp"
 
 namespace corpuscle {
 namespace {
@@ -54,6 +55,7 @@ class CaseReader {
       note_without_contact(scene);
     }
     note_unused_types(scene);
+    for (auto& text : unusual_values(scene)) scene.remarks.push_back(std::move(text));
     read_time_section(scene);
     check_sampling(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = scene.has_cells() || !scene.bodies.empty();

@@ -138,7 +138,8 @@ void read_constants(Section& s, CellSettings& c) {
   read_rest(s, c);
   c.interior = s.choice<Interior>("interior", {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
   if (c.interior == Interior::cytosol)
-    s.fail("interior", "a fluid inside the cell does not exist yet; use \"empty\" (the volume is held exactly)");
+    s.fail("interior", "leave this key out, or use \"empty\": with coupling.scheme = \"force\" the cell is filled with fluid (viscosity_ratio), and with the "
+                       "others it has none and its volume is held exactly");
   c.viscosity_ratio = s.number("viscosity_ratio", viscosity_ratios(), c.viscosity_ratio);
   read_membrane(s, c);
 }

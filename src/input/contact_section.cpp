@@ -1,5 +1,8 @@
 // [contact].
+#include <fmt/format.h>
+
 #include "core/units.hpp"
+#include "input/contact_limits.hpp"
 #include "input/sections.hpp"
 
 namespace corpuscle {
@@ -12,11 +15,11 @@ ContactSettings read_contact(Section& s) {
   c.aggregation_energy = s.number("aggregation_energy_fJ_per_um2", between(0, most_fJ_per_um2), c.aggregation_energy);
   const std::string reach = "aggregation_range_um";
   if (c.aggregation_energy > 0) {
-    c.aggregation_range_um = s.number(reach, between(least_um, 2 * most_contact_um), 2 * c.range_um);
+    c.aggregation_range_um = s.number(reach, between(least_um, most_aggregation_range_um), 2 * c.range_um);
     if (c.aggregation_range_um < 1.2 * c.range_um)
       s.fail(reach, "must be at least 1.2 times range_um, where the repulsion ends and the attraction is strongest");
   } else {
-    s.describe(reach, "a number, at least 1.2 times range_um", "twice range_um");
+    s.describe(reach, fmt::format("a number from {:g} to {:g}, at least 1.2 times range_um", least_um, most_aggregation_range_um), "twice range_um");
     s.unused(reach, "only with aggregation_energy_fJ_per_um2 above 0");
   }
   s.finish();

@@ -35,6 +35,7 @@ TEST_CASE("what a run stores changes none of its figures and warnings") {
   CHECK(little["warnings"] == much["warnings"]);
   // Seen at the start, where the pressure lags behind the flow most.
   CHECK(little["errors"]["splitting_max"] > 2 * little["errors"]["splitting"].get<double>());
+  CHECK(has(little["errors"], "slip_max"));
 }
 
 TEST_CASE("the errors against Poiseuille's flow are those of a flow that is one") {

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "app/figure_levels.hpp"
+#include "app/run_totals.hpp"
 #include "program.hpp"
 
 using namespace app;
@@ -72,6 +73,24 @@ TEST_CASE("bad figures become warnings with their key, good ones do not") {
   CHECK(judge(good, moving).empty());
   CHECK(figures_of(judge({{"least_body_spacings", 1.2}}, moving)) == Words{"least_body_spacings"});
   CHECK(figures_of(judge({{"slip", std::nan("")}}, moving)) == Words{"slip"});
+}
+
+TEST_CASE("slip is judged over the run, not by the first steps of a sudden start") {
+  RunTotals totals;
+  totals.add({1, 0, 4e-4, 1e-3});  // the fluid has not yet followed
+  for (int n = 1; n < 40; ++n) totals.add({1.0 + n, 0, 5e-5, 1e-3});
+  CHECK(totals.slip() == Approx((4e-4 + 39 * 5e-5) / 40 / 1e-3));
+  CHECK(judge({{"slip", totals.slip()}}, moving).empty());
+  CHECK(totals.slip_speed == 4e-4);
+  // A pause is none of the flow: what slips while it lasts is judged by the flow that there is.
+  totals.add({1000, 0, 1e-12, 1e-9});
+  CHECK(totals.slip() > 0.05);
+  totals.add({1001, 0, std::nan(""), 1e-3});
+  CHECK(figures_of(judge({{"slip", totals.slip()}}, moving)) == Words{"slip"});
+  // Totals of before there was a mean are read, and count from there on.
+  auto old = nlohmann::json::parse(to_text(RunTotals()));
+  old.erase("slip_um"), old.erase("way_um");
+  CHECK(totals_from(old.dump()).slip() == 0);
 }
 
 TEST_CASE("what membranes as forces leave of the energy is judged by their own good runs") {

@@ -8,6 +8,7 @@
 #include "capsule.hpp"
 #include "coupling/energy_balance.hpp"
 #include "immersed/surface_geometry.hpp"
+#include "membrane/reference.hpp"
 
 using namespace corpuscle;
 using namespace corpuscle::scenes;
@@ -102,6 +103,14 @@ TEST_CASE("a sheared cell keeps its volume, and the energy balances", "[coupling
   CHECK(r.area == Approx(r.rest_area).epsilon(0.03));
   CHECK(r.imbalance < 0.02);
   CHECK(r.coupling_imbalance < 0.005);
+}
+
+TEST_CASE("a cell keeps the volume that it starts with, whatever that of its rest", "[coupling][force]") {
+  Case scene = sheared_cell(10, 40, false);
+  scene.cells[0].reference = CellSettings::Reference::uniform;  // 94 um3, and the mesh has 91.5
+  const CellReference type = make_reference(scene.cells[0]);
+  REQUIRE(std::abs(volume(type.mesh) / type.law.rest_volume - 1) > 0.01);
+  CHECK(run(scene).volume == Approx(volume(type.mesh)).epsilon(1e-6));
 }
 
 TEST_CASE("membranes follow a flow that grows as well with long steps as with short ones", "[coupling][force]") {

@@ -142,6 +142,35 @@ TEST_CASE("a moving wall must not move through itself", "[ranks]") {
   CHECK_THAT(refusal(lid), Contains("must not move through itself"));
 }
 
+TEST_CASE("walls that would tear a cell in a step are refused, and fast ones warned of") {
+  const Box box;
+  auto sides = between(Type::moving_wall, Type::moving_wall);  // 12 um apart
+  sides[4].velocity = Triple{-0.3, 0, 0}, sides[5].velocity = Triple{0.3, 0, 0};
+  const auto strain = [&](double step_us) {
+    try {
+      return check_wall_strain(box.grid, sides, step_us);
+    } catch (const InputError& error) {
+      return std::string("InputError: ") + error.what();
+    }
+  };
+  CHECK(strain(9.9).empty());
+  CHECK_THAT(strain(10.1), !Contains("InputError: ") && Contains("boundary.4.velocity_mm_per_s = [-300, 0, 0]") && Contains("12 um away") &&
+                               Contains("600 mm/s") && Contains("by 0.505 in a step of 10.1 us") && Contains("time.step_us to 9.8 us"));
+  CHECK_THAT(strain(39.9), !Contains("InputError: ") && Contains("strains"));
+  CHECK_THAT(strain(40.1), Contains("InputError: boundary.4.velocity_mm_per_s"));
+  sides[5].velocity = sides[4].velocity;  // the fluid between goes with them
+  CHECK(strain(1e4).empty());
+  sides[5].type = Type::symmetry;
+  CHECK(strain(1e4).empty());
+  sides[5].type = Type::wall;
+  CHECK_THAT(strain(1e4), Contains("InputError: "));
+  sides[4].ramp_us = 20;
+  CHECK_THAT(strain(1e4), Contains("InputError: "));
+  sides[4].time_table = {{0, 0}, {10, 1e-4}};
+  sides[4].ramp_us = 0;
+  CHECK(strain(20).empty());
+}
+
 namespace {
 
 /// A box of 20 um, nodes 0.5 um apart, or along z as given.
@@ -268,6 +297,28 @@ TEST_CASE("a grid too coarse for a body is refused with the figures and what wou
   Scene enough(41);
   enough.cell({0, 0, 0});
   CHECK(enough.refusal() == "accepted");
+}
+
+TEST_CASE("a grid that is just too coarse is told with figures that differ") {
+  Scene s;
+  s.cell({0, 0, 0});
+  const double typical = s.resolution().typical;
+  s.scene.coupling = CouplingSettings{};
+  s.scene.coupling->scheme = CouplingSettings::Scheme::force;
+  // The limit is 0.5; nodes so far apart that the figure is a hair above it.
+  for (const double above : {1.0004, 1.004}) {
+    const double spacing = 0.5 * above * 0.5 / typical;
+    GridSettings grid = *s.scene.grid;
+    for (int d = 0; d < 3; ++d) {
+      const double middle = 0.5 * (grid.lower_um[d] + grid.upper_um[d]), half = 0.5 * spacing * (grid.nodes[d] - 1);
+      grid.lower_um[d] = middle - half, grid.upper_um[d] = middle + half;
+    }
+    const Grid built(Comm(), make_node_source(grid), {false, false, false});
+    Membranes membranes(s.scene.cells, {});
+    const auto coarse = check_surfaces(built, s.scene, membranes.surfaces());
+    REQUIRE(coarse.size() >= 1);
+    CHECK_THAT(coarse[0].text, Contains(above < 1.001 ? "0.5002 or more" : "0.502 or more") && Contains("no more than 0.5 will do"));
+  }
 }
 
 TEST_CASE("a rigid body that passes more than a spacing in a step is refused with its Courant number") {

@@ -211,6 +211,16 @@ TEST_CASE("keys that mean nothing in a scene are remarked upon") {
   only("no side is an \"outflow\"", "time.stop_before_outflow_um=2");
   only("less than the shortest step, 20 us", "output.history_every_us=1e-6");
   only("volume_modulus_Pa = 1000", "cell_types.0.volume_modulus_Pa=1000");
+  // Slips of the unit.
+  only("cell_types.0.shear_modulus_uN_per_m = 6.32e-06 is far from what there is: red cells have 2 to 20 uN/m",
+       "cell_types.0.shear_modulus_uN_per_m=6.32e-6");
+  only("cell_types.0.shear_modulus_uN_per_m = 6320", "cell_types.0.shear_modulus_uN_per_m=6320");
+  only("cell_types.0.membrane_viscosity_N_s_per_m = 0.3", "cell_types.0.membrane_viscosity_N_s_per_m=0.3");
+  only("cell_types.0.bending_modulus_J = 2.4e-12", "cell_types.0.bending_modulus_J=2.4e-12");
+  only("fluid.density_pg_per_um3 = 1000", "fluid.density_pg_per_um3=1000");
+  only("fluid.kinematic_viscosity_um2_per_us = 1.1e-06", "fluid.kinematic_viscosity_um2_per_us=1.1e-6");
+  for (const char* usual : {"capsule_shear.toml", "straight_tube.toml", "blood_tube.toml", "relax.toml", "stretch.toml"})
+    CHECK(read(usual).remarks.empty());
   // Nothing is left of it that could limit a step.
   CHECK(read("two_cells.toml", {"cell_types.0.volume_modulus_Pa=1000"}).cells[0].volume_modulus_Pa == 0);
   CHECK(read("straight_tube.toml").cells[0].volume_modulus_Pa == 248);

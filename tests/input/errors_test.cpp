@@ -234,7 +234,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(cell("shear_modulus_uN_per_m = 0"), {":12: cells.0.shear_modulus_uN_per_m = 0", "above 0"});
   require_parts(cell("local_area_modulus_uN_per_m = 0"), {":12: cells.0.local_area_modulus_uN_per_m = 0", "ill-posed"});
   require_parts(cell("axis = [0, 0, 0]"), {":12: cells.0.axis", "must not be zero"});
-  require_parts(cell("interior = \"cytosol\""), {":12: cells.0.interior", "does not exist yet", "\"empty\""});
+  require_parts(cell("interior = \"cytosol\""), {":12: cells.0.interior", "viscosity_ratio", "\"empty\""});
   require_parts(cell("reference = \"shapes\""), {":12: cells.0.reference", "did you mean \"shape\"?"});
   require_parts(cell("mesh = \"missing.off\""), {":12: cells.0.mesh", "there is no file", "missing.off"});
   const auto mesh = (cases / "mills2004.csv").string();
