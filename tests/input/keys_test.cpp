@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/error.hpp"
+#include "input/case_file.hpp"
 #include "input/key_list.hpp"
 
 using namespace corpuscle;
