@@ -112,8 +112,8 @@ TEST_CASE("memory grows with a rank's own cells alone", "[coupling][cells][memor
   const double first_slope = (own_mb[1] - own_mb[0]) / (cells[1] - cells[0]);
   const double slope = (own_mb[2] - own_mb[1]) / (cells[2] - cells[1]);
   INFO(first_slope << " and " << slope << " MB a cell");
-  CHECK(slope < 0.22);
-  CHECK(slope == Approx(first_slope).epsilon(0.1));  // linear, up to the room that arrays have to spare
+  CHECK(slope < 0.2);
+  CHECK(slope < 1.1 * first_slope);  // linear, up to the room that arrays have to spare; what few cells hold at once many hold in parts
 }
 
 TEST_CASE("cytosol, membrane viscosity and slip leave a cell's memory below its bound", "[coupling][cells][memory]") {
@@ -126,7 +126,7 @@ TEST_CASE("cytosol, membrane viscosity and slip leave a cell's memory below its 
     const double slope = (many.mb - few.mb) / (many.own + many.copies - few.own - few.copies);
     INFO(slope << " MB a cell" << (touching ? " with contact" : ""));
     if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{:.4f} MB a cell{}", slope, touching ? " with contact" : ""));
-    CHECK(slope < (touching ? 0.26 : 0.23));  // with what contact knows of a vertex, and no lists: these are too far from each other
+    CHECK(slope < (touching ? 0.18 : 0.155));  // with what contact knows of a vertex, and no lists: these are too far from each other
   }
 }
 
