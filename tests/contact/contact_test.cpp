@@ -486,6 +486,46 @@ TEST_CASE("on which side of a sharp fold a point is does not depend on which of 
   CHECK(by_triangles > 50);  // what it is there for
 }
 
+TEST_CASE("a triangle that is squeezed flat, or turned over, does not say which side of a membrane a point is on", "[contact]") {
+  // A corner of a sphere is moved over the opposite edge of one of its triangles, by so much of its height.
+  const double over = GENERATE(0.9, 1.0, 1.1);
+  SurfaceSet set = cells_of({sphere_mesh(1, {}, 0.3)});
+  const auto triangle = triangles_on_host(set);
+  const auto x = on_host(set.x);
+  const int squeezed = 40;
+  const Vec3 foot = 0.5 * (load(x, triangle(squeezed, 1)) + load(x, triangle(squeezed, 2))), corner = load(x, triangle(squeezed, 0));
+  store(x, triangle(squeezed, 0), corner + over * (foot - corner));
+  Kokkos::deep_copy(set.x, x);
+  const Vec3 along = load(x, triangle(squeezed, 2)) - load(x, triangle(squeezed, 1));
+  const Vec3 outward = (1 / norm(foot)) * foot;
+  constexpr int points = 200;
+  int wrong = 0, by_it = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::test::sides", Policy(0, points), KOKKOS_LAMBDA(int n, int& sum) {
+        const Vec3 p = foot + (0.004 * (n - points / 2)) * along + (n % 2 == 0 ? 0.08 : -0.08) * outward;
+        double least = 1e300;
+        TrianglePoint nearest{};
+        int t = 0;
+        for (int other = 0; other < set.triangles; ++other) {
+          const Corners k = corners(set, other, {});
+          const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
+          const double distance = norm(p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c));
+          if (distance < least) least = distance, nearest = at, t = other;
+        }
+        const Corners k = corners(set, t, {});
+        const Vec3 away = p - (nearest.weight[0] * k.a + nearest.weight[1] * k.b + nearest.weight[2] * k.c);
+        const double inside = n % 2 == 0 ? 1 : -1;
+        if (inside * dot(away, outward_at(set, t, nearest.feature)) < 0) ++sum;
+      },
+      wrong);
+  Kokkos::parallel_reduce(
+      "corpuscle::test::normals", Policy(0, 1),
+      KOKKOS_LAMBDA(int, int& sum) { sum += dot(FaceNormal(set, squeezed).unit, outward) < 0 ? 1 : 0; }, by_it);
+  INFO("over by " << over);
+  CHECK(wrong == 0);
+  CHECK(by_it == (over > 1 ? 1 : 0));
+}
+
 namespace {
 
 /// A sphere of so many triangles that those next to each other are more than 16 bits apart: one half of every quadrangle comes first.
