@@ -22,7 +22,7 @@ inline void measure_membranes(const MembraneViews& m, const Components<double>& 
               const Vec3 corner = load(x, s.triangle(t, 0));
               const Vec3 a = area_vector(corner, load(x, s.triangle(t, 1)), load(x, s.triangle(t, 2)));
               const double area = norm(a);
-              store(geometry, t, a * (1 / area));
+              store(geometry, t, a * (area > 0 ? 1 / area : 0));
               geometry(t, 3) = area;
               sum[0] += area;
               sum[1] += dot(corner - origin, a) / 3;
@@ -58,7 +58,9 @@ void evaluate_triangles(const MembraneViews& m, const Array<Law>& laws, const Ce
           TriangleState state;
           for (int k = 0; k < 3; ++k) {
             state.corner[k] = load(x, surface.triangle(t, k));
-            state.other_normal[k] = load(m.triangle_geometry, surface.neighbour(t, k));
+            const int other = surface.neighbour(t, k);
+            state.other_normal[k] = load(m.triangle_geometry, other);
+            state.other_share[k] = BendingShare(m.triangle_geometry(other, 3) / m.rest_area(other + shift)).value;
           }
           state.normal = load(m.triangle_geometry, t);
           state.area = m.triangle_geometry(t, 3);

@@ -59,11 +59,28 @@ KOKKOS_INLINE_FUNCTION double bending_energy(const Dihedral& angle, double cos_r
   return k_b * (1 - (angle.cosine * cos_rest + angle.sine * sin_rest) + Fold(angle, cos_rest).energy);
 }
 
+/// How much a triangle takes part in the bending of its sides, by its area over that at rest. All of it down to `whole`: below,
+/// angles turn by ever more for the same way of a corner, by any for that of a triangle whose corners lie on a line, and one step
+/// would throw it away. The share falls faster than its height squared from there on, and forces and stiffness with it.
+struct BendingShare {
+  static constexpr double whole = 0.5;
+  double value = 1, over_ratio, slope = 0;  // itself, over the ratio of areas, and how it changes with that
+
+  KOKKOS_INLINE_FUNCTION explicit BendingShare(double ratio) : over_ratio(1 / ratio) {
+    const double t = ratio / whole;
+    if (t >= 1) return;
+    over_ratio = t * t * (4 - 3 * t) / whole;
+    value = over_ratio * ratio;
+    slope = 12 * t * t * (1 - t) / whole;
+  }
+};
+
 struct TriangleState {
   Vec3 corner[3];
-  Vec3 normal;           // unit, outward
-  double area;           // um2
-  Vec3 other_normal[3];  // of the triangle across the side opposite each corner
+  Vec3 normal;                        // unit, outward
+  double area;                        // um2
+  Vec3 other_normal[3];               // of the triangle across the side opposite each corner
+  double other_share[3] = {1, 1, 1};  // BendingShare of those
 };
 
 /// Sum over the triangle of what the global terms need: dE/dA of the cell and the pressure -dE/dV.
@@ -85,12 +102,12 @@ template <class Law>
 KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law,
                                               const Law& in_plane, const GlobalLoads& loads, Vec3 (&force)[3]) {
   const TriangleShape shape = triangle_shape(s.corner, s.normal, s.area);
-  const double tension = loads.tension + law.local_area * (s.area - rest.area) / rest.area;
+  const BendingShare share(s.area / rest.area);
+  double tension = loads.tension + law.local_area * (s.area - rest.area) / rest.area;
   const double pressure = loads.pressure * s.area / 3;
   double along_normal[3] = {pressure, pressure, pressure};
-  // dA/dx of a corner is n x (opposite side) / 2.
-  for (int k = 0; k < 3; ++k) force[k] = (-0.5 * tension) * cross(s.normal, shape.side[k]);
-  const double half_over_area = 0.5 / s.area;
+  for (int k = 0; k < 3; ++k) force[k] = {};
+  const double share_over_twice_area = 0.5 * share.over_ratio / rest.area;
   const double strain = in_plane.add_forces(shape, rest, force);
   for (int k = 0; k < 3; ++k) {
     const int a = (k + 1) % 3, b = (k + 2) % 3;
@@ -98,14 +115,16 @@ KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const Tria
     // The angle falls by 1/h when corner k rises by 1 along the normal (h its height over the side); the two ends share
     // the opposite change by the foot of that height, so that the part exerts no net force or torque.
     const Dihedral angle = dihedral(s.normal, s.other_normal[k], shape.side[k] * inverse);
-    const double moment = bending_moment(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
-    const double per_height = moment * length * half_over_area;
+    const double k_b = s.other_share[k] * law.bending;
+    const double per_height = bending_moment(angle, rest.cos_angle[k], rest.sin_angle[k], k_b) * length * share_over_twice_area;
+    if (share.slope > 0) tension += bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], k_b) * share.slope / rest.area;
     const double foot = -dot(shape.side[b], shape.side[k]) * inverse * inverse;
     along_normal[k] += per_height;
     along_normal[a] -= (1 - foot) * per_height;
     along_normal[b] -= foot * per_height;
   }
-  for (int k = 0; k < 3; ++k) force[k] += along_normal[k] * s.normal;
+  // dA/dx of a corner is n x (opposite side) / 2.
+  for (int k = 0; k < 3; ++k) force[k] += along_normal[k] * s.normal - (0.5 * tension) * cross(s.normal, shape.side[k]);
   return strain;
 }
 

@@ -27,13 +27,11 @@ struct MarkerKink {
 };
 
 /// How much is taken off at a gap of so many spacings from a side that gives the velocity. The weights are folded back there, and so are
-/// their slopes: the fluid is seen to go on beyond the side, with the membrane's mirror image. From a spacing on that is right for planes
-/// at any place of the grid, sheared or pulled, as far from a side as elsewhere; nearer the image's own kink takes from that of the
-/// membrane, up to all of it on the side, and what shears between the two is no mean of both sides any more.
+/// their slopes: the fluid is seen to go on beyond the side, with the membrane's mirror image, whose own kink takes from that of the
+/// membrane, up to all of it on the side: what is missing grows with the gap.
 KOKKOS_INLINE_FUNCTION double kink_share_beside(double spacings) {
-  constexpr double none = 0.5, all = 1;
-  const double t = (spacings - none) / (all - none);
-  return t <= 0 ? 0 : (t >= 1 ? 1 : t * t);
+  constexpr double all = 1.25;
+  return spacings <= 0 ? 0 : (spacings >= all ? 1 : spacings / all);
 }
 
 /// Of the sides that a marker is near. Where fluid slips along a side or leaves through it, all is taken off.

@@ -151,6 +151,50 @@ TEST_CASE("every force is minus the gradient of its energy") {
   report("term {}: relative error {:.1e}", int(term), error);
 }
 
+TEST_CASE("a triangle that is squeezed flat, and through itself, is not thrown away by bending") {
+  OneCell cell(cell_settings(300), Term::bending);
+  const auto rest_area = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), cell.views.rest_area);
+  const auto triangle = triangles_on_host(cell.views.surface);
+  const int squeezed = 100, corner[3] = {triangle(squeezed, 0), triangle(squeezed, 1), triangle(squeezed, 2)};
+  const Vec3 a = cell.x[corner[1]], along = cell.x[corner[2]] - a, foot = a + 0.4 * along;
+  const Vec3 height = cell.x[corner[0]] - foot - (dot(cell.x[corner[0]] - foot, along) / dot(along, along)) * along;
+  const double whole = rest_area(squeezed) / (0.5 * norm(along) * norm(height));  // heights for the area at rest
+  const auto forces = [&] {
+    to_device(cell.x, cell.views.surface.x);
+    cell.elasticity->membrane_forces(cell.views, cell.views.surface.x, cell.views.force);
+    return to_host(cell.views.force, cell.views.vertices);
+  };
+  const auto largest = [&](double ratio) {
+    cell.x[corner[0]] = foot + ratio * whole * height;
+    double most = 0;
+    for (const Vec3& f : forces()) most = std::max(most, norm(f));
+    return most;
+  };
+  const double at_half = largest(0.5);
+  for (double ratio : {0.4, 0.2, 0.1, 1e-2, 1e-3, 1e-5, -1e-5, -1e-3, -0.1}) {
+    INFO("at " << ratio << " of its area at rest");
+    CHECK(largest(ratio) < 20 * at_half);
+  }
+  for (double ratio : {0.52, 0.45, 0.2, 0.05, -0.1}) {
+    cell.x[corner[0]] = foot + ratio * whole * height;
+    const auto force = forces();
+    double error = 0, scale = 0;
+    const double h = 1e-4 * std::abs(ratio);
+    for (int vertex : corner)
+      for (int d = 0; d < 3; ++d) {
+        const double slope = (8 * (cell.energy_at(vertex, d, h) - cell.energy_at(vertex, d, -h)) -
+                              (cell.energy_at(vertex, d, 2 * h) - cell.energy_at(vertex, d, -2 * h))) / (12 * h);
+        error = std::max(error, std::abs(slope + force[vertex][d]));
+        scale = std::max(scale, std::abs(slope));
+      }
+    INFO("at " << ratio << " of its area at rest: " << error / scale);
+    CHECK(error < 1e-5 * scale);
+    const auto [net, torque] = imbalance(cell.x, force);
+    CHECK(net < 1e-11);
+    CHECK(torque < 1e-11);
+  }
+}
+
 TEST_CASE("internal forces of a deformed cell exert no net force or torque") {
   const auto term =
       GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
