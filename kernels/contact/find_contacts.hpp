@@ -6,15 +6,38 @@
 
 namespace corpuscle {
 
+/// Unit normal, and how far it is to be relied on: all the way for triangles of some height, not at all for those whose corners lie
+/// nearly on a line, which may well look inward.
+struct FaceNormal {
+  Vec3 unit;
+  double trust;
+
+  KOKKOS_INLINE_FUNCTION FaceNormal(const SurfaceSet& s, int t) {
+    constexpr double none = 0.1, all = 0.3;  // of 4 sqrt(3) area over the sum of the squared sides: 1 where they are equal
+    const Corners k = corners(s, t, {});
+    const Vec3 b = k.b - k.a, c = k.c - k.a, n = cross(b, c);
+    const double length = norm(n), squares = dot(b, b) + dot(c, c) + dot(c - b, c - b);
+    const double share = ((length > 0 ? 2 * 1.7320508075688772 * length / squares : 0) - none) / (all - none);
+    unit = (length > 0 ? 1 / length : 0) * n;
+    trust = share <= 0 ? 0 : (share >= 1 ? 1 : share);
+  }
+};
+
+/// Of a triangle, or in so far as it is nearly flat of its neighbours, between which it is hardly there.
 KOKKOS_INLINE_FUNCTION Vec3 unit_normal(const SurfaceSet& s, int t) {
-  const Corners k = corners(s, t, {});
-  const Vec3 n = cross(k.b - k.a, k.c - k.a);
-  const double length = norm(n);
-  return (length > 0 ? 1 / length : 0) * n;
+  const FaceNormal own(s, t);
+  if (own.trust == 1) return own.unit;
+  Vec3 sum = own.trust * own.unit;
+  for (int k = 0; k < 3; ++k) {
+    const FaceNormal other(s, s.neighbour(t, k));
+    sum += ((1 - own.trust) * other.trust) * other.unit;
+  }
+  const double length = norm(sum);
+  return length > 0 ? (1 / length) * sum : own.unit;
 }
 
 /// Outward at a point of triangle t: has the right sign for any point whose closest surface point it is (Baerentzen &
-/// Aanaes, IEEE Trans. Vis. Comput. Graph. 11, 2005).
+/// Aanaes, IEEE Trans. Vis. Comput. Graph. 11, 2005), with the normals of unit_normal().
 KOKKOS_INLINE_FUNCTION Vec3 outward_at(const SurfaceSet& s, int t, int feature) {
   if (feature == 0) return unit_normal(s, t);
   if (feature <= 3) return unit_normal(s, t) + unit_normal(s, s.neighbour(t, feature - 1));

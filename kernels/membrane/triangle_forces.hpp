@@ -18,6 +18,21 @@ struct CellLaw {
   double tangential_damping = 0;  // gamma_T
 };
 
+/// A triangle that is squeezed to less than `from` of its area at rest, which k_d alone does not keep from turning over: springs have
+/// hardly more to say as its corners come to lie on a line. Over k_d, by its area over that at rest: dE/dA, and the energy per area at
+/// rest. Finite, and at most some seven times as stiff as springs, so that steps which follow those can follow this.
+struct Squeeze {
+  double tension = 0, energy = 0;
+
+  KOKKOS_INLINE_FUNCTION explicit Squeeze(double ratio) {
+    constexpr double from = 0.5, strength = 8;
+    const double t = 1 - ratio / from;
+    if (t <= 0) return;
+    tension = -strength * t * t;
+    energy = strength * from / 3 * t * t * t;
+  }
+};
+
 struct Dihedral {
   double cosine, sine;
 };
@@ -102,8 +117,9 @@ template <class Law>
 KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law,
                                               const Law& in_plane, const GlobalLoads& loads, Vec3 (&force)[3]) {
   const TriangleShape shape = triangle_shape(s.corner, s.normal, s.area);
-  const BendingShare share(s.area / rest.area);
-  double tension = loads.tension + law.local_area * (s.area - rest.area) / rest.area;
+  const double ratio = s.area / rest.area;
+  const BendingShare share(ratio);
+  double tension = loads.tension + law.local_area * (ratio - 1 + Squeeze(ratio).tension);
   const double pressure = loads.pressure * s.area / 3;
   double along_normal[3] = {pressure, pressure, pressure};
   for (int k = 0; k < 3; ++k) force[k] = {};
