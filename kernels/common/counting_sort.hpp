@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "common/types.hpp"
+#include "common/summing.hpp"
 
 namespace corpuscle {
 
@@ -22,8 +22,8 @@ void counting_sort(const std::string& label, int count, int bins, const Bin& bin
         if (b >= 0) Kokkos::atomic_fetch_add(&start(b), 1);
       });
   // To the end of each bin; placing the items counts it down to the start.
-  Kokkos::parallel_scan(
-      label + "_ends", Policy(0, bins + 1), KOKKOS_LAMBDA(int b, int& sum, bool last) {
+  start_running_sum<int>(
+      label + "_ends", bins + 1, KOKKOS_LAMBDA(int b, int& sum, bool last) {
         sum += start(b);
         if (last) start(b) = sum;
       });

@@ -50,11 +50,17 @@ class HostCopy {
 };
 
 #if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+/// Loops run on the device alone. A lambda for both sides would be kept by the host behind pointers that each translation unit sets for
+/// itself: in a header's loop that several share, the linker keeps one function, and it may not find its own.
+#undef KOKKOS_LAMBDA
+#define KOKKOS_LAMBDA [=] __device__
+#define CORPUSCLE_DEVICE_FUNCTION __device__
 /// What a loop holds goes along with its launch, up to 4 kB. Kokkos would put more than 512 bytes into constant memory, of which
 /// there is one: each launch would wait until the one before has ended.
 using WithLaunch = Kokkos::Experimental::WorkItemProperty::HintLightWeight_t;
 using Policy = Kokkos::RangePolicy<Exec, WithLaunch>;
 #else
+#define CORPUSCLE_DEVICE_FUNCTION
 using Policy = Kokkos::RangePolicy<Exec>;
 #endif
 

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "common/summing.hpp"
 #include "contact/contact_views.hpp"
 #include "contact/triangle_bins.hpp"
 #include "immersed/triangle.hpp"
@@ -83,16 +84,12 @@ struct ContactSearch {
 /// the firsts mean nothing
 inline std::int64_t numbers_to_starts(const std::string& label, const Array<int>& numbers, int vertices) {
   const auto first = numbers;
-  std::int64_t total = 0;
-  Kokkos::parallel_scan(
-      label, Policy(0, vertices + 1),
-      KOKKOS_LAMBDA(int v, std::int64_t& sum, bool last) {
+  return running_sum<std::int64_t>(
+      label, vertices + 1, KOKKOS_LAMBDA(int v, std::int64_t& sum, bool last) {
         const int own = v < vertices ? first(v) : 0;
         if (last) first(v) = static_cast<int>(sum);
         sum += own;
-      },
-      total);
-  return total;
+      });
 }
 
 /// What lists are made from.

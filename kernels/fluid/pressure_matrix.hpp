@@ -1,6 +1,7 @@
 // Rows of the pressure equation: minus the divergence of the compact gradient, one row per owned cell.
 #pragma once
 
+#include "common/summing.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "grid/grid_views.hpp"
 
@@ -142,10 +143,8 @@ inline void number_rows(const IndexSpace& index, int first, const Array<int>& nu
 /// global number and length. Returns the number of entries.
 inline int assign_slots(const Table<int>& column, int first, int count, const Table<int>& slot, const Array<int>& row,
                         const Array<int>& length) {
-  int entries = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::fluid::pressure_slots", Policy(0, static_cast<int>(row.extent(0))),
-      KOKKOS_LAMBDA(int r, int& next, bool final) {
+  return running_sum<int>(
+      "corpuscle::fluid::pressure_slots", static_cast<int>(row.extent(0)), KOKKOS_LAMBDA(int r, int& next, bool final) {
         int here = 0;
         for (int n = 0; n < count; ++n) {
           const bool present = column(r, n) >= 0;
@@ -154,9 +153,7 @@ inline int assign_slots(const Table<int>& column, int first, int count, const Ta
         }
         if (final) row(r) = first + r, length(r) = here;
         next += here;
-      },
-      entries);
-  return entries;
+      });
 }
 
 /// packed(slot(r, n)) = entry(r, n)

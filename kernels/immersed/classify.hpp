@@ -2,6 +2,7 @@
 // ranks, no step needs a neighbour's answer: every rank holds all surfaces and classifies its halo itself.
 #pragma once
 
+#include "common/summing.hpp"
 #include "immersed/band.hpp"
 #include "immersed/clearance.hpp"
 
@@ -327,19 +328,15 @@ inline void count_nodes(const Lattice& lattice, const NodeBox& box, const BandVi
 /// Owned immersed nodes in ascending order; entries beyond the list's extent are dropped. @returns how many there are.
 inline int list_immersed(const IndexSpace& index, const NodeBox& box, const Array<NodeKind>& kind,
                          const Array<int>& list) {
-  int total = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::immersed::list_immersed", Policy(0, box.size()),
-      KOKKOS_LAMBDA(int e, int& position, bool final) {
+  return running_sum<int>(
+      "corpuscle::immersed::list_immersed", box.size(), KOKKOS_LAMBDA(int e, int& position, bool final) {
         int i[3];
         box.unpack(e, i);
         const int c = index.cell(i[0], i[1], i[2]);
         if (!index.owns(i[0], i[1], i[2]) || kind(c) != NodeKind::immersed) return;
         if (final && position < static_cast<int>(list.extent(0))) list(position) = c;
         ++position;
-      },
-      total);
-  return total;
+      });
 }
 
 }  // namespace corpuscle

@@ -1,6 +1,7 @@
 // Faces between fluid and immersed nodes, sorted by the body that owns the immersed node.
 #pragma once
 
+#include "common/summing.hpp"
 #include "immersed/views.hpp"
 
 namespace corpuscle {
@@ -70,16 +71,12 @@ inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bod
             count);
         Kokkos::single(Kokkos::PerTeam(team), [&]() { start(body) = count; });
       });
-  int total = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::immersed::face_offsets", Policy(0, bodies + 1),
-      KOKKOS_LAMBDA(int b, int& sum, bool final) {
+  return running_sum<int>(
+      "corpuscle::immersed::face_offsets", bodies + 1, KOKKOS_LAMBDA(int b, int& sum, bool final) {
         const int count = b < bodies ? start(b) : 0;
         if (final) start(b) = sum;
         sum += count;
-      },
-      total);
-  return total;
+      });
 }
 
 /// Fills the lists, in ascending order of the fluid node within each body; the lists must be long enough.

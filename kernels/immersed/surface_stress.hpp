@@ -8,6 +8,7 @@
 
 #include <string>
 
+#include "common/summing.hpp"
 #include "common/sums.hpp"
 #include "immersed/surface_geometry.hpp"
 
@@ -65,14 +66,14 @@ KOKKOS_INLINE_FUNCTION Vec3 fluid_force(const SurfaceSet& s, const SurfaceStress
 /// @returns the lowest vertex of unseen_pressure without a neighbour that has one, or no_vertex: its load is a guess
 inline int complete_stress(const SurfaceSet& surface, const SurfaceStress& found, const SurfaceStress& stress,
                            const Components<double>& traction) {
-  using Team = Kokkos::TeamPolicy<Exec>;
+  using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const SurfaceSet s = surface;
   const SurfaceStress in = found, out = stress;
   const auto total = traction;
   int guessed = no_vertex;
-  Kokkos::parallel_reduce(
-      "corpuscle::immersed::complete_stress", Team(s.bodies, Kokkos::AUTO),
-      KOKKOS_LAMBDA(const Team::member_type& team, int& lowest) {
+  reduce_teams<int>(
+      "corpuscle::immersed::complete_stress", s.bodies,
+      KOKKOS_LAMBDA(const Team& team, int& lowest) {
         const int b = team.league_rank(), first = s.first_vertex(b), last = s.first_vertex(b + 1);
         Sums<2> known;
         Kokkos::parallel_reduce(

@@ -1,6 +1,7 @@
 // From vertices to markers: which vertices reach this rank's faces, and where they are in index space.
 #pragma once
 
+#include "common/summing.hpp"
 #include "immersed/surface_views.hpp"
 #include "transfer/marker_views.hpp"
 #include "transfer/node_bins.hpp"
@@ -117,16 +118,12 @@ inline void find_vertices(const MarkerSearch& search, const Components<double>& 
 inline int number_markers(const VertexPlaces& places, const MarkerViews& markers, int room) {
   const auto reach = places.reach;
   const auto vertex = markers.vertex;
-  int total = 0;
-  Kokkos::parallel_scan(
-      "corpuscle::transfer::number_markers", Policy(0, places.vertices),
-      KOKKOS_LAMBDA(int v, int& sum, bool last) {
+  return running_sum<int>(
+      "corpuscle::transfer::number_markers", places.vertices, KOKKOS_LAMBDA(int v, int& sum, bool last) {
         if (!reach(v)) return;
         if (last && sum < room) vertex(sum) = v;
         ++sum;
-      },
-      total);
-  return total;
+      });
 }
 
 /// Fills home of the markers. Which node is nearest is rounded, so that ranks which see the same point under
