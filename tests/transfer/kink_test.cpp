@@ -271,7 +271,7 @@ TEST_CASE("beside a wall a plane between two fluids moves as well as it does ami
   const double r = GENERATE(0.2, 5.0), mean = 0.5 * (1 + r);
   const auto sheared = [&](double gap, bool with) { return plane_error(high - gap, r, 1, 0, with) * (gap + (high - gap) / r) / (1 - 1 / r); };
   const auto pulled = [&](double gap, bool with, Type top) { return plane_error(high - gap, r, 0, 1, with, top) * mean; };
-  for (const double gap : {0.1, 0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.7, 2.3}) {
+  for (const double gap : {0.2, 0.5, 0.85, 1.2, 1.7}) {
     const double without = sheared(gap, false), with = sheared(gap, true), far = sheared(gap + 4, true);
     const double pulled_without = pulled(gap, false, walls[3]), pulled_with = pulled(gap, true, walls[3]), pulled_far = pulled(gap + 4, true, walls[3]);
     const double free_without = pulled(gap, false, Type::symmetry), free_with = pulled(gap, true, Type::symmetry), free_far = pulled(gap + 4, true, Type::symmetry);
