@@ -6,8 +6,8 @@
 
 namespace corpuscle {
 
-/// Unit normal, and how far it is to be relied on: all the way for triangles of some height, not at all for those whose corners lie
-/// nearly on a line, which may well look inward.
+/// Unit normal, and how far it is to be relied on: all the way for triangles of some height and those of rigid bodies, not at all for those of
+/// membranes whose corners lie nearly on a line, which may well look inward.
 struct FaceNormal {
   Vec3 unit;
   double trust;
@@ -19,7 +19,7 @@ struct FaceNormal {
     const double length = norm(n), squares = dot(b, b) + dot(c, c) + dot(c - b, c - b);
     const double share = ((length > 0 ? 2 * 1.7320508075688772 * length / squares : 0) - none) / (all - none);
     unit = (length > 0 ? 1 / length : 0) * n;
-    trust = share <= 0 ? 0 : (share >= 1 ? 1 : share);
+    trust = s.triangle_body(t) >= s.cells || share >= 1 ? 1 : (share <= 0 ? 0 : share);
   }
 };
 
@@ -52,6 +52,19 @@ KOKKOS_INLINE_FUNCTION Vec3 outward_at(const SurfaceSet& s, int t, int feature) 
   return sum;
 }
 
+/// How often a body's surface goes round a point: once inside, never outside, whatever folds there are nearby (solid angles: van Oosterom &
+/// Strackee, IEEE Trans. Biomed. Eng. 30, 1983). Looks at all of its triangles.
+KOKKOS_INLINE_FUNCTION double winding_around(const SurfaceSet& s, int body, const Vec3& p) {
+  double angle = 0;
+  for (int t = s.first_triangle(body); t < s.first_triangle(body + 1); ++t) {
+    const Corners k = corners(s, t, {});
+    const Vec3 a = k.a - p, b = k.b - p, c = k.c - p;
+    const double la = norm(a), lb = norm(b), lc = norm(c);
+    angle += std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return angle / (2 * 3.14159265358979323846);
+}
+
 /// Nearest so far among a group.
 struct Nearest {
   double square = 1e300;  // of the distance, um2
@@ -67,7 +80,9 @@ KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bo
   const Vec3 away = p - (best.at.weight[0] * k.a + best.at.weight[1] * k.b + best.at.weight[2] * k.c);
   const double distance = norm(away);
   const Vec3 outward = outward_at(s, t, best.at.feature);
-  const bool inside = dot(away, outward) < 0;
+  // Where a triangle has turned over, what is in front of it looks as if it were behind: all triangles are asked before another body's
+  // inside is believed.
+  const bool inside = dot(away, outward) < 0 && (own || winding_around(s, s.triangle_body(t), p) > 0.5);
   // On the surface itself the direction is the surface's.
   const double length = norm(outward);
   const Vec3 along =

@@ -39,13 +39,12 @@ KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int 
   const TriangleShape shape = triangle_shape(corner, normal, area);
   Sums<6> sum;
   sum[0] = in_plane.energy(shape, rest);
-  const double ratio = area / rest.area, share = BendingShare(ratio).value;
   for (int k = 0; k < 3; ++k) {
-    const int other = s.neighbour(t, k);
-    const Dihedral angle = dihedral(normal, load(m.triangle_geometry, other), shape.side[k] * (1 / shape.length[k]));
-    const double k_b = share * BendingShare(m.triangle_geometry(other, 3) / m.rest_area(type_triangle + other - t)).value * law.bending;
-    sum[1] += 0.5 * bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], k_b);
+    const Dihedral angle =
+        dihedral(normal, load(m.triangle_geometry, s.neighbour(t, k)), shape.side[k] * (1 / shape.length[k]));
+    sum[1] += 0.5 * bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
   }
+  const double ratio = area / rest.area;
   sum[2] = law.local_area * rest.area * (0.5 * (ratio - 1) * (ratio - 1) + Squeeze(ratio).energy);
   // First moment of the tetrahedron from the origin: its volume times the mean of its four corners.
   const Vec3 moment = (area * dot(corner[0], normal) / 12) * (corner[0] + corner[1] + corner[2]);

@@ -20,7 +20,7 @@ struct CellLaw {
 
 /// A triangle that is squeezed to less than `from` of its area at rest, which k_d alone does not keep from turning over: springs have
 /// hardly more to say as its corners come to lie on a line. Over k_d, by its area over that at rest: dE/dA, and the energy per area at
-/// rest. Finite, and at most some seven times as stiff as springs, so that steps which follow those can follow this.
+/// rest. Finite, and with the usual k_d at most some seven times as stiff as springs.
 struct Squeeze {
   double tension = 0, energy = 0;
 
@@ -76,17 +76,16 @@ KOKKOS_INLINE_FUNCTION double bending_energy(const Dihedral& angle, double cos_r
 
 /// How much a triangle takes part in the bending of its sides, by its area over that at rest. All of it down to `whole`: below,
 /// angles turn by ever more for the same way of a corner, by any for that of a triangle whose corners lie on a line, and one step
-/// would throw it away. The share falls faster than its height squared from there on, and forces and stiffness with it.
+/// would throw it away. Forces alone: an energy with this share would pull folded triangles flat, where it has none.
 struct BendingShare {
   static constexpr double whole = 0.5;
-  double value = 1, over_ratio, slope = 0;  // itself, over the ratio of areas, and how it changes with that
+  double value = 1, over_ratio;  // itself, and over the ratio of areas
 
   KOKKOS_INLINE_FUNCTION explicit BendingShare(double ratio) : over_ratio(1 / ratio) {
     const double t = ratio / whole;
     if (t >= 1) return;
     over_ratio = t * t * (4 - 3 * t) / whole;
     value = over_ratio * ratio;
-    slope = 12 * t * t * (1 - t) / whole;
   }
 };
 
@@ -119,7 +118,7 @@ KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const Tria
   const TriangleShape shape = triangle_shape(s.corner, s.normal, s.area);
   const double ratio = s.area / rest.area;
   const BendingShare share(ratio);
-  double tension = loads.tension + law.local_area * (ratio - 1 + Squeeze(ratio).tension);
+  const double tension = loads.tension + law.local_area * (ratio - 1 + Squeeze(ratio).tension);
   const double pressure = loads.pressure * s.area / 3;
   double along_normal[3] = {pressure, pressure, pressure};
   for (int k = 0; k < 3; ++k) force[k] = {};
@@ -133,7 +132,6 @@ KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const Tria
     const Dihedral angle = dihedral(s.normal, s.other_normal[k], shape.side[k] * inverse);
     const double k_b = s.other_share[k] * law.bending;
     const double per_height = bending_moment(angle, rest.cos_angle[k], rest.sin_angle[k], k_b) * length * share_over_twice_area;
-    if (share.slope > 0) tension += bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], k_b) * share.slope / rest.area;
     const double foot = -dot(shape.side[b], shape.side[k]) * inverse * inverse;
     along_normal[k] += per_height;
     along_normal[a] -= (1 - foot) * per_height;

@@ -28,7 +28,7 @@ struct MarkerKink {
 
 /// How much is taken off at a gap of so many spacings from a side that gives the velocity. The weights are folded back there, and so are
 /// their slopes: the fluid is seen to go on beyond the side, with the membrane's mirror image, whose own kink takes from that of the
-/// membrane, up to all of it on the side: what is missing grows with the gap.
+/// membrane, up to all of it on the side: what there is to take off grows with the gap.
 KOKKOS_INLINE_FUNCTION double kink_share_beside(double spacings) {
   constexpr double all = 1.25;
   return spacings <= 0 ? 0 : (spacings >= all ? 1 : spacings / all);
