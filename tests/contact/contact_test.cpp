@@ -501,14 +501,13 @@ TEST_CASE("a triangle that is squeezed flat, or turned over, does not say which 
   constexpr int points = 800;
   const ContactViews contact{Array<int>("corpuscle::test::item", points), Array<double>("corpuscle::test::gap", points),
                              Table<double>("corpuscle::test::weight", points, 3), Table<double>("corpuscle::test::normal", points, 3)};
-  const double most_over = over;
   int wrong = 0, by_triangles = 0;
   // Above and below the triangle and what lies beside it; turned over far it may hide that a point is inside, never that one is outside.
   const auto ask = [&](bool by_normals, int& total) {
     Kokkos::parallel_reduce(
         "corpuscle::test::sides", Policy(0, points), KOKKOS_LAMBDA(int n, int& sum) {
           const bool outside = n % 2 == 0;
-          if (!outside && most_over > 1.2) return;
+          if (!outside && over > 1.2) return;
           const Vec3 p = foot + (0.008 * (n / 2 % 100 - 50)) * along + (0.25 * (n / 200)) * ahead + (outside ? 0.08 : -0.08) * outward;
           Nearest best;
           for (int t = 0; t < set.triangles; ++t) {
