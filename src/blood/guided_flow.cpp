@@ -226,12 +226,21 @@ std::string why_unguided(const Case& scene) {
 }
 
 double plasma_speed(const Case& scene, const GuidedFlow& flow) {
-  constexpr int along = 4, steps = 5;
+  constexpr int steps = 5, coarse = 12;
   GridSettings piece = *scene.grid;
-  std::array<bool, 3> periodic{};
+  std::array<bool, 3> periodic{}, free{};
+  int most_across = 0;
   for (int d = 0; d < 3; ++d) {
     periodic[d] = side_of(scene, 2 * d).type == Type::periodic;
-    if (d == flow.across || (flow.frame.tube() && d < 2) || (flow.duct >= 0 && d != flow.duct)) continue;
+    free[d] = d != flow.across && !(flow.frame.tube() && d < 2) && (flow.duct < 0 || d == flow.duct);
+    if (!free[d]) most_across = std::max(most_across, piece.nodes[d] - 1);
+  }
+  // Long enough to be coarsened as often as the cross-section has to be: what is left is then solved directly.
+  int longest = IndexSpace::halo;
+  for (int cells = most_across; cells > coarse; cells = (cells + 1) / 2) longest *= 2;
+  for (int d = 0; d < 3; ++d) {
+    if (!free[d]) continue;
+    const int along = std::min(longest, piece.nodes[d] - 1);
     const double share = static_cast<double>(along) / (piece.nodes[d] - 1);
     piece.nodes[d] = along + 1;
     if (flow.frame.tube())
