@@ -7,12 +7,14 @@
 #include <tuple>
 
 #include "core/error.hpp"
+#include "core/log.hpp"
 #include "core/units.hpp"
 #include "membrane/coarse_graining.hpp"
 #include "membrane/mesh_generator.hpp"
 #include "membrane/spheroid_reference.hpp"
 #include "membrane/surface_file.hpp"
 #include "membrane/surface_shape.hpp"
+#include "membrane/triangle_forces.hpp"
 
 namespace corpuscle {
 
@@ -112,6 +114,23 @@ double smallest_vertex_area(const TriangleMesh& mesh) {
   return *std::min_element(share.begin(), share.end());
 }
 
+/// Triangles that the mesh has smaller than half of what they rest on are pushed open from the first step on.
+void warn_of_squeezed(const CellReference& r, const CellSettings& cell) {
+  int squeezed = 0;
+  double least = 1;
+  const auto at = [&](int i) { return Vec3{r.mesh.vertices[i][0], r.mesh.vertices[i][1], r.mesh.vertices[i][2]}; };
+  for (std::size_t t = 0; t < r.mesh.triangles.size(); ++t) {
+    const auto [a, b, c] = r.mesh.triangles[t];
+    const double ratio = 0.5 * norm(cross(at(b) - at(a), at(c) - at(a))) / r.rest_area[t];
+    squeezed += ratio < BendingShare::whole;
+    least = std::min(least, ratio);
+  }
+  if (squeezed == 0) return;
+  warn("{}: {} of the {} triangles of the mesh have less than half of the area that they rest on (down to {:.2g} of it): they start squeezed, are pushed "
+       "open and bend less; use reference = \"shape\", or a mesh whose triangles are more alike",
+       constant_key(cell, "reference"), squeezed, r.mesh.triangles.size(), least);
+}
+
 auto type_key(const CellSettings& c) {
   return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align,
                   c.mass_pg, c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation,
@@ -151,6 +170,7 @@ CellReference make_reference(const CellSettings& cell) {
     for (double& a : r.rest_area) a *= shrink * shrink;
   }
   r.smallest_vertex_area = smallest_vertex_area(r.mesh);
+  warn_of_squeezed(r, cell);
   return r;
 }
 

@@ -1,5 +1,6 @@
 // Scenes of membranes as forces that start where they should not: refused or warned of, with what helps.
 #include <cmath>
+#include <fstream>
 
 #include "program.hpp"
 
@@ -45,6 +46,36 @@ TEST_CASE("cells beside a wall without contact, and deep in each other's repulsi
   const std::string pressed = "start pressed against";
   CHECK_THAT(checked(folder, "blood_tube", both(pack, {"contact.range_um=2"})), Contains(pressed) && Contains("contact.range_um"));
   CHECK_THAT(checked(folder, "blood_tube", pack), !Contains(pressed));
+}
+
+TEST_CASE("a mesh with triangles much smaller than what reference gives them to rest on is warned of") {
+  const auto folder = fresh_folder("squeezed_start");
+  succeed(folder, {"mesh", "--vertices", "300", "-o", "even.off"});
+  std::ifstream even(folder / "even.off");
+  std::ofstream graded(folder / "graded.off");
+  std::string line;
+  std::getline(even, line);
+  graded << line << '\n';
+  int vertices = 0, triangles = 0, edges = 0;
+  even >> vertices >> triangles >> edges;
+  graded << vertices << ' ' << triangles << ' ' << edges << '\n';
+  for (int v = 0; v < vertices; ++v) {
+    double x = 0, y = 0, z = 0;
+    even >> x >> y >> z;
+    const double towards_axis = std::hypot(x, y) / 4;
+    graded << x * towards_axis << ' ' << y * towards_axis << ' ' << z << '\n';
+  }
+  graded << even.rdbuf();
+  graded.close();
+  const auto start = [&](const std::string& reference) {
+    std::string text = contents(scene("relax"));
+    const std::string built_in = "vertices = 500";
+    text.replace(text.find(built_in), built_in.size(), "mesh = \"graded.off\"\nreference = \"" + reference + "\"");
+    std::ofstream(folder / "graded.toml") << text;
+    return succeed(folder, {"check", "graded.toml"}).output;
+  };
+  CHECK_THAT(start("uniform"), Contains("start squeezed") && Contains("reference = \"shape\""));
+  CHECK_THAT(start("shape"), !Contains("start squeezed"));
 }
 
 TEST_CASE("scenes of membranes as forces that cannot be are refused with what helps") {

@@ -296,6 +296,20 @@ TEST_CASE("spring law") {
   CHECK(std::isfinite(law.force(5, 1)));  // beyond the contour length
 }
 
+TEST_CASE("a squeezed triangle: what it costs to flatten it, and what it takes part in bending") {
+  // Eight times k_d, where k_d alone comes to one; from half the area at rest on, without a jump.
+  CHECK(Squeeze(0.5).tension == 0);
+  CHECK(Squeeze(0.499).tension == Approx(0).margin(1e-4));
+  CHECK(Squeeze(0.25).tension == Approx(-2));
+  CHECK(Squeeze(0).tension == Approx(-8));
+  CHECK(Squeeze(0).energy == Approx(4.0 / 3));
+  CHECK(BendingShare(0.5).value == 1);
+  CHECK(BendingShare(0.499).value == Approx(1).epsilon(1e-4));
+  CHECK(BendingShare(0.25).value == Approx(0.3125));
+  CHECK(BendingShare(1e-9).value == Approx(0).margin(1e-15));
+  for (const double ratio : {2.0, 0.7, 0.4, 0.1}) CHECK(BendingShare(ratio).over_ratio * ratio == Approx(BendingShare(ratio).value));
+}
+
 TEST_CASE("signed dihedral angle") {
   const Vec3 up{0, 0, 1}, along{0, 1, 0};
   const Dihedral convex = dihedral(up, {0.6, 0, 0.8}, along);  // the right-hand neighbour falls away

@@ -74,6 +74,9 @@ TEST_CASE("a cell has the same forces and the same viscosity whichever others ar
       places.push_back(Vec3{p[0], p[1], p[2]} + 0.02 * noise.vec());
       velocities.push_back(1e-3 * noise.vec());
     }
+    // One that is squeezed to a fifth of its area: what it and its neighbours have at rest is asked for across cells.
+    const auto [a, b, apex] = types[type].mesh.triangles[7];
+    places[apex] = places[apex] - 0.8 * (places[apex] - 0.5 * (places[a] + places[b]));
     x.push_back(places), v.push_back(velocities);
   }
   const auto together = answers(types, cells, x, v);
