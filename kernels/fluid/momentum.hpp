@@ -177,7 +177,7 @@ struct MomentumOperator : std::conditional_t<convective, FaceFluxes, NoFluxes>, 
   KOKKOS_FORCEINLINE_FUNCTION auto apply(const Velocity& u, int c) const {
     using Real = typename Velocity::non_const_value_type;
     Vector3<Real> image = (mass_over_mu * volume(c)) * load(u, c) - viscous_force<skewed>(g, u, index, c);
-    subtract_excess(static_cast<const Viscosity&>(*this), kind, index, c, image);
+    subtract_excess(static_cast<const Viscosity&>(*this), c, image);
     if constexpr (convective)
       for (int m = 0; m < 3; ++m) {
         double sum = 0;

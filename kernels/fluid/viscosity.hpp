@@ -13,10 +13,17 @@ struct UniformViscosity {};
 struct VaryingViscosity {
   Array<double> relative;
   double least;
+  bool bodies;             // whether there may be nodes inside bodies
   Array<double> fluidity;  // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
   Array<double> smooth;    // [cell] of smooth_viscosity(), then
   Components<double> x, face_area[3];  // as in GridViews
-  Components<double> excess[3];        // [cell, 3] of find_excess(), on faces where there is any
+  // Of mark_excess(): what the face of each direction below a cell, and the cell itself, have beyond the uniform viscosity's.
+  Array<unsigned char> marks;
+  Components<double> excess[3];  // [cell, 3] of find_excess(), on faces that are marked
+  Components<double> force;      // [cell, 3] the same, of whole cells: zero where none is marked
+
+  static constexpr unsigned char face_mark(int d) { return 1 << d; }
+  static constexpr unsigned char cell_mark = 1 << 3;
 };
 
 KOKKOS_FORCEINLINE_FUNCTION double relative_viscosity(const UniformViscosity&, int) { return 1; }
@@ -120,7 +127,8 @@ KOKKOS_INLINE_FUNCTION Vec3 excess_flux(const VaryingViscosity& v, double r, con
   const Vec3 area = load(v.face_area[d], c);
   Vec3 du[3], flux;
   for (int e = 0; e < 3; ++e) {
-    du[e] = face.of([&](int at) { return to_double(load(u, at)); }, kind, index, e);
+    const auto value = [&](int at) { return to_double(load(u, at)); };
+    du[e] = v.bodies ? face.of(value, kind, index, e) : face.of(value, index, e);
     flux += ((r - 1) * dot(area, face.dual.b[e])) * du[e] + ((r - v.least) * dot(area, du[e])) * face.dual.b[e];
   }
   constexpr double round_off = 1e-12;
@@ -156,7 +164,36 @@ KOKKOS_INLINE_FUNCTION bool uniform_beside_body(const VaryingViscosity& v, const
   return true;
 }
 
-/// excess_flux() of u on the faces of owned cells, into v.excess: once for the two cells of each.
+/// Where find_excess() has anything to find with the present viscosity and nodes: there alone is it looked for, a few times a step.
+inline void mark_excess(const VaryingViscosity& viscosity, const Array<NodeKind>& kinds, const IndexSpace& of_cells) {
+  const VaryingViscosity v = viscosity;
+  const Array<NodeKind> kind = kinds;
+  const IndexSpace index = of_cells;
+  for_box("corpuscle::fluid::excess_marks", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int at[3] = {i, j, k}, c = index.cell(i, j, k);
+    int beyond = 0;  // directions along which the cell is none of the owned ones
+    for (int d = 0; d < 3; ++d) beyond += at[d] == index.n[d];
+    unsigned char marks = 0;
+    bool any = false;
+    for (int d = 0; d < 3; ++d) {
+      if (beyond > (at[d] == index.n[d] ? 1 : 0)) continue;  // no face of an owned cell
+      const int low = c - index.stride(d), high = c + index.stride(d);
+      const bool below = exceeds(v, kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c));
+      if (below) marks |= VaryingViscosity::face_mark(d);
+      any = any || below || (beyond == 0 && exceeds(v, face_viscosity(v, kind, c, high)));
+    }
+    if (beyond == 0) {
+      if (any && !(v.least != 1 && uniform_beside_body(v, kind, index, c)))
+        marks |= VaryingViscosity::cell_mark;
+      else
+        store(v.force, c, Vec3{});
+    }
+    v.marks(c) = marks;
+  });
+}
+
+/// What a viscosity that varies adds to the viscous force of u on owned cells, over the uniform one, into v.force: div(r (grad u +
+/// grad u^T)) less div grad u. After mark_excess().
 template <class Velocity>
 void find_excess(const UniformViscosity&, const Velocity&, const Array<NodeKind>&, const IndexSpace&) {}
 template <class Velocity>
@@ -165,34 +202,36 @@ void find_excess(const VaryingViscosity& viscosity, const Velocity& velocity, co
   const Velocity u = velocity;
   const Array<NodeKind> kind = kinds;
   const IndexSpace index = of_cells;
-  for (int d = 0; d < 3; ++d) {
-    const Components<double> excess = v.excess[d];
-    std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
-    upper[d] += 1;
-    for_box("corpuscle::fluid::excess_flux", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
-      const int c = index.cell(i, j, k), low = c - index.stride(d);
+  for_box("corpuscle::fluid::excess_flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const unsigned char marks = v.marks(c);
+    if (marks == 0) return;
+    for (int d = 0; d < 3; ++d) {
+      if (!(marks & VaryingViscosity::face_mark(d))) continue;
+      const int low = c - index.stride(d);
       const double r = kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c);
-      if (exceeds(v, r)) store(excess, c, excess_flux(v, r, u, kind, index, d, c));
-    });
-  }
+      store(v.excess[d], c, excess_flux(v, r, u, kind, index, d, c));
+    }
+  });
+  for_owned("corpuscle::fluid::excess_force", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    if (!(v.marks(c) & VaryingViscosity::cell_mark)) return;
+    Vec3 force;
+    for (int d = 0; d < 3; ++d) {
+      const int next = c + index.stride(d);
+      if (v.marks(c) & VaryingViscosity::face_mark(d)) force -= load(v.excess[d], c);
+      if (v.marks(next) & VaryingViscosity::face_mark(d)) force += load(v.excess[d], next);
+    }
+    store(v.force, c, force);
+  });
 }
 
-/// image -= what a viscosity that varies adds to the viscous force on cell c, over the uniform one: div(r (grad u + grad u^T)) less
-/// div grad u. After find_excess().
+/// image -= v.force of cell c.
 template <class Image>
-KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const UniformViscosity&, const Array<NodeKind>&, const IndexSpace&, int, Image&) {}
+KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const UniformViscosity&, int, Image&) {}
 template <class Image>
-KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const VaryingViscosity& v, const Array<NodeKind>& kind, const IndexSpace& index, int c,
-                                                 Image& image) {
-  if (v.least != 1 && uniform_beside_body(v, kind, index, c)) return;
-  Vec3 force;
-  for (int d = 0; d < 3; ++d)
-    for (int end = 0; end < 2; ++end) {
-      const int s = index.stride(d);
-      if (!exceeds(v, face_viscosity(v, kind, c, end == 0 ? c - s : c + s))) continue;
-      force += (end == 0 ? -1.0 : 1.0) * load(v.excess[d], end == 0 ? c : c + s);
-    }
-  for (int m = 0; m < 3; ++m) image[m] -= force[m];
+KOKKOS_FORCEINLINE_FUNCTION void subtract_excess(const VaryingViscosity& v, int c, Image& image) {
+  for (int m = 0; m < 3; ++m) image[m] -= v.force(c, m);
 }
 
 }  // namespace corpuscle

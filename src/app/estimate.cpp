@@ -283,7 +283,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const double transfer = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : 0;                        // Transfer
   const double search = transfer + ((size.shared ? size.rigid > 0 : surfaces) ? 51 : 0);            // ImmersedBoundary
   const bool ratios = any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; });
-  const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 3 * 24 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
+  const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 4 * 24 + 1 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
   const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
   const double rows = 19;

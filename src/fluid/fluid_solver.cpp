@@ -89,6 +89,8 @@ void FluidSolver::set_viscosity(const Array<double>& relative, double least, con
   least_viscosity_ = least;
   // Only where cells are it is ever written: what a run takes of memory must not grow as they come to other places.
   for (auto& excess : excess_) excess = Components<double>("corpuscle::fluid::excess_flux", grid_->index().size(), 3);
+  excess_force_ = Components<double>("corpuscle::fluid::excess_force", grid_->index().size(), 3);
+  excess_marks_ = Array<unsigned char>("corpuscle::fluid::excess_marks", grid_->index().size());
   momentum_.reset();
   viscous_hierarchy_ = std::make_unique<MultigridHierarchy>(*grid_, g_.normal);
   make_momentum(*viscous_hierarchy_);
@@ -344,6 +346,8 @@ void FluidSolver::solve_and_project(const EmbeddedBodies* bodies, double residua
 void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
   if (relative_viscosity_.data()) update_diagonal();  // with what it is now
   if (fluidity_.data()) smooth_viscosity(grid_->index(), relative_viscosity_, smooth_viscosity_);
+  has_bodies_ = bodies != nullptr;
+  visit_varying_viscosity([this](const VaryingViscosity& v) { mark_excess(v, kind_, grid_->index()); });
   update_momentum_cycle();
   assemble_history(time);
   complete_velocity(bodies);

@@ -90,9 +90,11 @@ class FluidSolver {
   void visit_varying_viscosity(const Use& use) const {
     const GridViews& grid = grid_->views();
     if (relative_viscosity_.data())
-      use(VaryingViscosity{relative_viscosity_, least_viscosity_, fluidity_, smooth_viscosity_, grid.x,
+      use(VaryingViscosity{relative_viscosity_, least_viscosity_, has_bodies_, fluidity_, smooth_viscosity_, grid.x,
                            {grid.face_area[0], grid.face_area[1], grid.face_area[2]},
-                           {excess_[0], excess_[1], excess_[2]}});
+                           excess_marks_,
+                           {excess_[0], excess_[1], excess_[2]},
+                           excess_force_});
   }
 
   /// Force density [cell, 3], kPa/um, added to the momentum equation, and a hook that is called with the time of every
@@ -178,8 +180,11 @@ class FluidSolver {
   Array<double> relative_viscosity_;  // empty: one viscosity
   Array<double> fluidity_;            // empty: no cell holds two fluids
   Array<double> smooth_viscosity_;    // where some do
-  Components<double> excess_[3];      // [cell, 3] on faces, um2/us times the viscosity that varies; only then
+  Array<unsigned char> excess_marks_;  // [cell] of a viscosity that varies, and only then, as the next two
+  Components<double> excess_[3];      // [cell, 3] on faces, um2/us times the viscosity
+  Components<double> excess_force_;   // [cell, 3]
   double least_viscosity_ = 1;
+  bool has_bodies_ = true;  // until a solve knows
   ViscousCoefficients g_;
   double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()
   std::unique_ptr<PressureAcceleration> acceleration_;  // once a step has needed it
