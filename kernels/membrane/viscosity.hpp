@@ -80,7 +80,7 @@ KOKKOS_INLINE_FUNCTION Vec3 damping_at(const SurfaceSet& s, const ViscosityViews
 struct FluidReaction {
   double beta;   // mPa s/um
   double share;  // of D
-  double ahead;  // the step over the last one; 0 to take what the last one left
+  double ahead;  // how much of what changed in the last step is expected of this one; 0 to take what the last one left
   Components<double> velocity, last_force, force;  // [vertex, 3] U, um/us; nN
   Components<double> past;  // [vertex, 3] nN, R U less the force, of the step before the last; becomes that of the last one. Zero
                             // at rest
@@ -103,10 +103,6 @@ KOKKOS_INLINE_FUNCTION Vec3 edge_reaction(const FluidReaction& fluid, const Cell
   return Damping::force(law, load(fluid.velocity, i) - load(fluid.velocity, j), along);
 }
 
-/// Of what changed in the last step: with all of it nothing would be late, but what is wrong at first, late by n steps without it, would
-/// swing for as long; with this it dies away in ten steps, and what grows is late by n / 10.
-constexpr double carried_on = 0.9;
-
 /// What drives vertex i, from inside the membrane and outside, nN. @param damping  D U there
 template <class Load>
 KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews& m, const Load& outside, int i, double area, const Vec3&) {
@@ -116,7 +112,7 @@ KOKKOS_INLINE_FUNCTION Vec3 driving_force(const MembraneViews&, const FluidReact
   const Vec3 last = (fluid.beta * area) * load(fluid.velocity, i) + fluid.share * damping - load(fluid.last_force, i);
   const Vec3 before = load(fluid.past, i);
   store(fluid.past, i, last);
-  return load(fluid.force, i) + last + carried_on * fluid.ahead * (last - before);
+  return load(fluid.force, i) + last + fluid.ahead * (last - before);
 }
 
 /// Right-hand side, diagonal, preconditioner and volume gradient at the current positions, of a part.

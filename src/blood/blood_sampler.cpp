@@ -58,7 +58,10 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
       began_us_(scene.blood->from_us) {
   if (!flow_) no_flow_ = why_unguided(scene);
   if (flow_) frame_ = flow_->frame;
-  if (flow_ && flow_->gradient != 0) plasma_speed_ = plasma_speed(scene, *flow_);
+  if (flow_ && flow_->gradient != 0) {
+    const auto scope = simulation.timers().scope("set-up");
+    plasma_speed_ = plasma_speed(simulation.grid().comm(), scene, *flow_);
+  }
   bins_ = !frame_.guided() ? 0 : settings_.bins > 0 ? settings_.bins : default_bins(scene, *flow_, simulation.grid());
   if (frame_.guided()) windows_ = std::max(1, static_cast<int>(std::lround(frame_.length / settings_.layer_window_um)));
   means_ = RunningMeans(first_bin + 2 * bins_);

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "core/error.hpp"
 #include "fluid/boundary_conditions.hpp"
 #include "fluid/flow_balances.hpp"
+#include "parallel/agree.hpp"
 
 namespace corpuscle {
 
@@ -225,24 +228,49 @@ std::string why_unguided(const Case& scene) {
   return "there is no pressure gradient, no inlet, and no wall that moves along another";
 }
 
-double plasma_speed(const Case& scene, const GuidedFlow& flow) {
-  constexpr int steps = 5, coarse = 12;
-  GridSettings piece = *scene.grid;
-  std::array<bool, 3> periodic{}, free{};
-  int most_across = 0;
+namespace {
+
+/// Directions of the grid along which plasma's flow does not change.
+std::array<bool, 3> unchanged(const GuidedFlow& flow) {
+  std::array<bool, 3> same{};
+  for (int d = 0; d < 3; ++d) same[d] = d != flow.across && !(flow.frame.tube() && d < 2) && (flow.duct < 0 || d == flow.duct);
+  return same;
+}
+
+}  // namespace
+
+std::array<int, 3> plasma_piece(const std::array<int, 3>& cells, const std::array<bool, 3>& unchanged) {
+  constexpr int few = 4, coarse = 12, most = 1 << 18;
+  std::array<int, 3> piece = cells;
+  int across = 0, free = 0;
+  double section = 1;
   for (int d = 0; d < 3; ++d) {
-    periodic[d] = side_of(scene, 2 * d).type == Type::periodic;
-    free[d] = d != flow.across && !(flow.frame.tube() && d < 2) && (flow.duct < 0 || d == flow.duct);
-    if (!free[d]) most_across = std::max(most_across, piece.nodes[d] - 1);
+    free += unchanged[d];
+    if (!unchanged[d]) across = std::max(across, cells[d]), section *= cells[d];
   }
-  // Long enough to be coarsened as often as the cross-section has to be: what is left is then solved directly.
+  // So long as to be coarsened as often as the cross-section has to be: what is left is then solved directly. Not where the section
+  // is large: what holds it must be small beside a rank's part of the scene.
   int longest = IndexSpace::halo;
-  for (int cells = most_across; cells > coarse; cells = (cells + 1) / 2) longest *= 2;
+  for (int n = across; n > coarse; n = (n + 1) / 2) longest *= 2;
+  const int along = free == 1 && section * longest <= most ? longest : few;
+  for (int d = 0; d < 3; ++d)
+    if (unchanged[d]) piece[d] = std::min(along, cells[d]);
+  return piece;
+}
+
+namespace {
+
+double solved_plasma_speed(const Case& scene, const GuidedFlow& flow) {
+  constexpr int steps = 5;
+  GridSettings piece = *scene.grid;
+  std::array<bool, 3> periodic{};
+  std::array<int, 3> cells{};
+  for (int d = 0; d < 3; ++d) periodic[d] = side_of(scene, 2 * d).type == Type::periodic, cells[d] = piece.nodes[d] - 1;
+  const std::array<int, 3> few = plasma_piece(cells, unchanged(flow));
   for (int d = 0; d < 3; ++d) {
-    if (!free[d]) continue;
-    const int along = std::min(longest, piece.nodes[d] - 1);
-    const double share = static_cast<double>(along) / (piece.nodes[d] - 1);
-    piece.nodes[d] = along + 1;
+    if (few[d] == cells[d]) continue;
+    const double share = static_cast<double>(few[d]) / cells[d];
+    piece.nodes[d] = few[d] + 1;
     if (flow.frame.tube())
       piece.length_um *= share;
     else
@@ -260,6 +288,21 @@ double plasma_speed(const Case& scene, const GuidedFlow& flow) {
   }
   const Triple mean = mean_velocity(fluid);
   return dot(to_vec3(mean), flow.frame.tangent);
+}
+
+}  // namespace
+
+double plasma_speed(const Comm& comm, const Case& scene, const GuidedFlow& flow) {
+  double speed = 0;
+  std::string failure;
+  try {
+    if (comm.rank() == 0) speed = solved_plasma_speed(scene, flow);
+  } catch (const ComputationError& error) {
+    failure = error.what();
+  }
+  failure = agree(comm, failure);
+  if (!failure.empty()) throw ComputationError("plasma alone, for blood.relative_apparent_viscosity: " + failure);
+  return comm.sum(speed);
 }
 
 void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,

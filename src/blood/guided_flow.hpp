@@ -1,7 +1,9 @@
 // What a scene's flow is: along a tube, between two walls, or through a periodic box, and what plasma alone does there.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string>
 
 #include "blood/flow_frame.hpp"
 #include "blood/wall_stress.hpp"
@@ -27,10 +29,14 @@ std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid
 /// Why there is nothing, where there is.
 std::string why_unguided(const Case& scene);
 
-/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same
-/// grid of four cells along the flow, so that its error is the same as that of the scene and leaves no trace in their
-/// ratio. Every rank does it for itself. @pre flow.gradient is not 0
-double plasma_speed(const Case& scene, const GuidedFlow& flow);
+/// Cells along each direction of a piece of a grid in which plasma alone is solved for. @param unchanged  along which it flows alike
+std::array<int, 3> plasma_piece(const std::array<int, 3>& cells, const std::array<bool, 3>& unchanged);
+
+/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a short piece of the same
+/// grid, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank calls; the first one has
+/// the piece. @pre flow.gradient is not 0
+/// @throws ComputationError  on all ranks
+double plasma_speed(const Comm& comm, const Case& scene, const GuidedFlow& flow);
 
 /// Stress of the flow on the walls around this block, resting and moving ones, into `stress` [cell, 3] of owned cells,
 /// kPa. Cells nearer to a wall than the kernel reaches act on it besides, by what is not in it.

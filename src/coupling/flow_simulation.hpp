@@ -28,6 +28,7 @@ class FlowSimulation {
   bool done() const { return tick_ >= schedule_.end(); }
 
   Grid& grid() { return *grid_; }
+  Timers& timers() { return timers_; }
   FluidSolver& fluid() { return *fluid_; }
   /// Null where the case has none.
   Coupling* coupling() { return coupling_.get(); }

@@ -8,7 +8,9 @@
 #include "coupling/surface_checks.hpp"
 #include "immersed/surface_geometry.hpp"
 #include "parallel/agree.hpp"
+#include "transfer/delta.hpp"
 #include "transfer/face_loss.hpp"
+#include "transfer/slip.hpp"
 #include "transfer/vertex_forces.hpp"
 
 namespace corpuscle {
@@ -28,10 +30,13 @@ Case without_cells(const Case& scene) {
   return rest;
 }
 
-/// Within which cells act on each other, um.
-double contact_reach(const Case& scene) {
+/// Within which cells act on each other, um. What slip is left to a vertex that a rank's faces feel, up to a kernel's reach and the half
+/// of a cell beyond the halo, depends on what is within the slip's reach of it.
+double contact_reach(const Case& scene, const Grid& grid) {
   if (!scene.contact) return 0;
-  return std::max(scene.contact->range_um, scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0.0);
+  const double farthest = FourPointDelta::reach + 0.5 + slip_reach - IndexSpace::halo;  // spacings
+  return std::max({scene.contact->range_um, scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0.0,
+                   scene.coupling->slip ? farthest * grid.largest_spacing() : 0.0});
 }
 
 }  // namespace
@@ -45,7 +50,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       lengths_us_(schedule.lengths_us()),
       workspace_(std::make_shared<Workspace>()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
-  take_places(scene, packed, contact_reach(scene));
+  take_places(scene, packed, contact_reach(scene, fluid.grid()));
   transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
                                          workspace_);
   if (sharp_pressure()) transfer_->sharpen_pressure();
@@ -209,7 +214,7 @@ StepStatistics ForceCoupling::advance(double time, double dt) {
     }
     {
       const auto membrane = timers_.scope("membrane");
-      together([&] { membranes_->resist(anticipated_reaction(dt), fluid_.step_ratio(), forces()); });
+      together([&] { membranes_->resist(anticipated_reaction(dt), carried_on(dt) * fluid_.step_ratio(), forces()); });
     }
     cells_->to_copies(forces());
     if (scene_.coupling->slip) limit_slip(dt);

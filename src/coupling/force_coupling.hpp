@@ -93,6 +93,7 @@ class ForceCoupling : public Coupling {
   double resisting_share() const;
   void find_softest();
   double anticipated_reaction(double dt) const;
+  double carried_on(double dt) const;
   /// The sum of all forces at the last gathering of loads.
   const Components<double>& forces() const { return loads_ ? loads_->force() : membranes_->views().force; }
   SlipViews slip_of_membranes() const;

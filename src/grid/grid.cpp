@@ -43,20 +43,21 @@ CrossCoefficients sum_cross_coefficients(const GridViews& grid, int d, double li
   return total;
 }
 
-/// Smallest distance between neighbouring centres of owned cells along d.
-double smallest_offset(const GridViews& grid, int d) {
+/// Smallest, or largest, distance between neighbouring centres of owned cells along d.
+template <bool largest>
+double extreme_offset(const GridViews& grid, int d) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
-  double smallest = std::numeric_limits<double>::max();
+  double extreme = largest ? 0 : std::numeric_limits<double>::max();
   Kokkos::parallel_reduce(
       "corpuscle::grid::spacing", Policy(0, index.owned()),
-      KOKKOS_LAMBDA(int e, double& least) {
+      KOKKOS_LAMBDA(int e, double& most) {
         const int i = e % index.n[0], j = (e / index.n[0]) % index.n[1], k = e / (index.n[0] * index.n[1]);
         const double distance = 2 * norm(central_offset(x, index.cell(i, j, k), index.stride(d)));
-        least = smaller(least, distance);
+        most = largest ? larger(most, distance) : smaller(most, distance);
       },
-      Smallest(smallest));
-  return smallest / 2;
+      Extreme<largest>(extreme));
+  return extreme / 2;
 }
 
 double sum_volume(const GridViews& grid) {
@@ -183,7 +184,8 @@ void Grid::measure() {
     comm_.sum(sums, 2);
     skewness_ = larger(skewness_, std::sqrt(sums[0] / total_volume_));
     skewed_share_ = larger(skewed_share_, sums[1] / total_volume_);
-    smallest_spacing_ = smaller(smallest_spacing_, comm_.min(smallest_offset(views_, d)));
+    smallest_spacing_ = smaller(smallest_spacing_, comm_.min(extreme_offset<false>(views_, d)));
+    largest_spacing_ = larger(largest_spacing_, comm_.max(extreme_offset<true>(views_, d)));
   }
 }
 

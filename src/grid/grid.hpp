@@ -30,6 +30,7 @@ class Grid {
   double total_volume() const { return total_volume_; }
   double mean_spacing() const { return mean_spacing_; }
   double smallest_spacing() const { return smallest_spacing_; }
+  double largest_spacing() const { return largest_spacing_; }
   /// Ratio of the larger tangential to the normal coefficient of a face gradient, rms over the volume; 0 on an
   /// orthogonal grid. Not the maximum: a conformal tube is orthogonal but for the four cells at its corners.
   double skewness() const { return skewness_; }
@@ -55,7 +56,7 @@ class Grid {
   std::array<Triple, 3> period_{};
   Triple corner_{};
   std::vector<double> owned_nodes_;
-  double total_volume_ = 0, mean_spacing_ = 0, smallest_spacing_ = 0, skewness_ = 0, skewed_share_ = 0;
+  double total_volume_ = 0, mean_spacing_ = 0, smallest_spacing_ = 0, largest_spacing_ = 0, skewness_ = 0, skewed_share_ = 0;
 };
 
 }  // namespace corpuscle

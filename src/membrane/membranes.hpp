@@ -102,7 +102,8 @@ class Membranes {
   /// Uses the workspace. surfaces().v is the fluid's answer to the force of the last step, and becomes an estimate of that to this one.
   /// @param beta   mPa s/um: how the force changes with the velocity, per area, as the fluid answers to the largest and slowest
   ///               deformations; twice that is too much
-  /// @param ahead  the step over the last one, to carry what the fluid did in the last two on to this one; 0 to take the last
+  /// @param ahead  how much of what changed in the last step is carried on to this one: a share of the step over the last one; 0 to
+  ///               take what the last one left
   void resist(double beta, double ahead, const Components<double>& force);
   /// The next resist() takes what the fluid did in the last step, whatever it is told: cells had no viscosity in that before.
   void resist_anew() { resists_anew_ = true; }

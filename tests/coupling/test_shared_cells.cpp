@@ -165,6 +165,31 @@ TEST_CASE("cells of other viscosities beside each other move the same on any num
   CHECK(off < 1e-8);  // um; round-off, and residuals of the solvers at 1e-13
 }
 
+TEST_CASE("what comes up behind a cell takes slip from it on the ranks that have only its copy", "[coupling][cells][ranks]") {
+  // Two capsules pressed against one at a side between ranks, with the wider kernel and spacings as large as gaps.
+  if (Comm().size() == 1) return;
+  Case scene = carried_capsules(90);
+  scene.grid->nodes = {25, 13, 13};
+  scene.grid->lower_um = {0, 0, 0}, scene.grid->upper_um = {24, 12, 12};
+  CellSettings cell = scene.cells[0];
+  cell.vertices = 400;
+  cell.law = CellSettings::Law::skalak;
+  cell.shear_modulus_uN_per_m = 30;
+  cell.viscosity_ratio = 5;
+  scene.cells.clear();
+  const double places[3] = {11.7, 6.2, 20}, sizes[3] = {1.6, 2, 2}, pushes[3] = {-0.55, 1.5, -0.95};
+  for (int n = 0; n < 3; ++n) {
+    cell.center_um = {places[n], 6, 6}, cell.radius_um = sizes[n], cell.push_nN = {pushes[n], 0, 0};
+    scene.cells.push_back(cell);
+  }
+  scene.contact = ContactSettings{};
+  scene.coupling->kernel = CouplingSettings::Kernel::four_point;
+  scene.time = {1, 90};
+  const double off = largest_difference(run(Comm::alone(), scene).x, run(Comm(), scene).x);
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("differ by {:.2e} um", off));
+  CHECK(off < 1e-8);
+}
+
 TEST_CASE("in a tube slip is held where strain stiffens, on any number of ranks alike", "[coupling][cells][ranks]") {
   // Two kinds of capsules drawn out to 1.3 times their length, in steps that leave no room for stiffer ones than at rest.
   Case scene;

@@ -29,7 +29,7 @@ std::vector<Answer> answers(const std::vector<CellReference>& types, const std::
     to_device(all_v, m.surfaces().v);
     m.compute_forces();
     force = to_host(m.views().force, m.vertices());
-    m.resist(0.7, 1, m.views().force);
+    m.resist(0.7, 0.9, m.views().force);
     m.forget_geometry();
   }
   const auto given = to_host(m.views().force, m.vertices()), velocity = to_host(m.surfaces().v, m.vertices());
