@@ -89,12 +89,15 @@ bool FlowOutput::due(double every_us) const {
 }
 
 /// Figures that cost a share of a step are taken, whatever the run stores, at the first steps, where most flows change fastest,
-/// at every eighth, and at the last: that one counts for this run's report alone, since a run that goes on from here would not
-/// have it.
-void FlowOutput::sample_flow() {
+/// and at every eighth.
+bool FlowOutput::regular() const {
   constexpr long first = 8, every = 8;
-  const long step = simulation_.steps();
-  const bool regular = step <= first || step % every == 0;
+  return simulation_.steps() <= first || simulation_.steps() % every == 0;
+}
+
+/// And at the last step: that one counts for this run's report alone, since a run that goes on from here would not have it.
+void FlowOutput::sample_flow() {
+  const bool regular = this->regular();
   if (!regular && !simulation_.done() && !simulation_.at_outflow()) return;
   const FlowSample sample{simulation_.time(), simulation_.fluid().splitting(),
                           simulation_.immersed() ? simulation_.immersed()->slip()[1] : 0.0,
@@ -125,11 +128,10 @@ void FlowOutput::after_step(bool start) {
   const auto scope = timers_.scope("output");
   if (!start) gather();
   const auto& output = scene_.output;
-  if (start || output.history_every_us <= 0 || due(output.history_every_us)) {
-    if (history_) {
-      measure_bodies();
-      history_->write();
-    }
+  const bool written = start || output.history_every_us <= 0 || due(output.history_every_us);
+  if (written || regular()) {
+    if (history_) measure_bodies();
+    if (history_ && written) history_->write();
     energy_.sample(history_ ? history_->elastic_energy() : 0);
   }
   if (!start) sample_flow();

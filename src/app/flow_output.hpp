@@ -41,6 +41,7 @@ class FlowOutput {
 
  private:
   bool due(double every_us) const;
+  bool regular() const;
   void sample_flow();
   void gather();
   void measure_bodies();

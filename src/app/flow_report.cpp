@@ -34,6 +34,8 @@ void report_energy(const FlowRecord& record, Report& report) {
   if (simulation.rigid_bodies()) terms["on_bodies"] = t.on_bodies;
   if (!simulation.membranes()) return;
   if (const auto own = energy.coupling_imbalance()) report.errors["energy_balance_coupling"] = *own;
+  if (t.membrane_dissipation < 0 && energy.largest_fJ() > 0)
+    report.errors["membrane_drive"] = -t.membrane_dissipation / energy.largest_fJ();
   terms["on_cells"] = t.on_cells;
   terms["elastic"] = t.elastic;
   if (t.pushed != 0) terms["pushed"] = t.pushed;

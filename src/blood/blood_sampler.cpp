@@ -263,7 +263,10 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
     return;
   }
   const std::string undriven = "no flow is driven through the grid in one direction" + (flow_ ? "" : ": " + no_flow_);
-  const std::string still = flow_ && flow_->driven ? "nothing flowed" : undriven;
+  const std::string still = flow_ && flow_->driven ? "nothing flowed"
+                            : flow_ && flow_->gradient == 0 && norm(simulation_.fluid().imposed_gradient()) > 0
+                                ? "walls that move carry the fluid along, besides what the pressure gradient drives"
+                                : undriven;
   leave("discharge_hematocrit", still);
   leave("mean_speed_mm_per_s", still);
   leave("cell_speed_mm_per_s", still);

@@ -120,6 +120,7 @@ class ForceCoupling : public Coupling {
   std::optional<PackingReport> packing_;  // only with populations
   std::optional<PackedShare> packed_;
   double packed_gap_ = 0;                 // um, the least of the populations'
+  bool packed_in_box_ = false;            // some are to start within one
   int packed_listed_ = 0;                 // cells of the scene that are not packed
   double small_stable_us_ = 0;            // stable_us_ and short_waves_ of packed cells before they have grown
   double small_short_waves_ = 0;

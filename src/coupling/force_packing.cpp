@@ -30,7 +30,10 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   packed_ = share_of(places, grid.comm());
   packed_listed_ = places.names.listed;
   packed_gap_ = 1e30;
-  for (const auto& population : scene.populations) packed_gap_ = std::min(packed_gap_, population.gap_um);
+  for (const auto& population : scene.populations) {
+    packed_gap_ = std::min(packed_gap_, population.gap_um);
+    packed_in_box_ = packed_in_box_ || population.lower_um || population.upper_um;
+  }
   if (places.size == 1) return;
   small_ = packed != nullptr;
   grows_ = packed == nullptr;
@@ -121,6 +124,9 @@ void ForceCoupling::inflate() {
   constexpr int settling = 200;     // steps at the end
   double size = packed_->size, mobility = 0;
   info("packing:  shapes at rest fit with {:.3f} of their size; they grow on as membranes", size);
+  if (packed_in_box_)
+    warn("populations: lower_um and upper_um hold shapes, not membranes as they grow: cells may start beyond the box by as much as the others "
+         "push them; ask for fewer (hematocrit, count) or for a larger box to have them all within it");
   const auto still = [this] { Kokkos::deep_copy(surfaces().v, 0.0); };
   try {
     membranes_->rest_at_size(size);

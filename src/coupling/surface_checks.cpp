@@ -211,15 +211,23 @@ double winding_number(const HostSurfaces& s, int body, const Vec3& point) {
 void check_outside(const HostSurfaces& s, int inner, int outer, const Triple& shift) {
   for (int d = 0; d < 3; ++d)
     if (s.lower[inner][d] + shift[d] > s.upper[outer][d] || s.upper[inner][d] + shift[d] < s.lower[outer][d]) return;
-  constexpr int looked_at = 60;
+  // All vertices within both boxes, if they are not too many: surfaces may overlap by little.
+  constexpr int looked_at = 200;
+  std::vector<Vec3> within;
+  for (int i = s.first_vertex(inner); i < s.first_vertex(inner + 1); ++i) {
+    const Vec3 x = s.at(i) + Vec3{shift[0], shift[1], shift[2]};
+    bool in_box = true;
+    for (int d = 0; d < 3; ++d) in_box = in_box && x[d] >= s.lower[outer][d] && x[d] <= s.upper[outer][d];
+    if (in_box) within.push_back(x);
+  }
+  const std::size_t stride = 1 + within.size() / looked_at;
   int inside = 0, looked = 0;
   std::optional<Vec3> where;
-  for (int i = s.first_vertex(inner); i < s.first_vertex(inner + 1); i += stride_of(s, inner, looked_at)) {
-    const Vec3 x = s.at(i) + Vec3{shift[0], shift[1], shift[2]};
+  for (std::size_t n = 0; n < within.size(); n += stride) {
     ++looked;
-    if (winding_number(s, outer, x) < 0.5) continue;
+    if (winding_number(s, outer, within[n]) < 0.5) continue;
     ++inside;
-    if (!where) where = x;
+    if (!where) where = within[n];
   }
   if (inside == 0) return;
   const int first = std::min(inner, outer), second = std::max(inner, outer);
@@ -228,8 +236,8 @@ void check_outside(const HostSurfaces& s, int inner, int outer, const Triple& sh
     throw InputError(fmt::format("surfaces cross: {} and its image beyond a periodic side overlap near {}; use a longer period or "
                                  "a smaller body",
                                  body_name(s.set, inner), there));
-  if (inside == looked)
-    throw InputError(fmt::format("{} lies inside {}, near {}; a body is solid throughout: move them apart (center_um)",
+  if (inside == looked && static_cast<int>(within.size()) == s.first_vertex(inner + 1) - s.first_vertex(inner))
+    throw InputError(fmt::format("{} lies inside {}, near {}; nothing else can be where one is: move them apart (center_um)",
                                  body_name(s.set, inner), body_name(s.set, outer), there));
   throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}: move them apart (center_um, axis)",
                                body_name(s.set, first), body_name(s.set, second), there));

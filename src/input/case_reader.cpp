@@ -61,6 +61,7 @@ class CaseReader {
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = scene.has_cells() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
     note_often_history(scene);
+    note_sharp_aggregation(scene);
     scene.resolved = echo_;
     return scene;
   }
@@ -153,6 +154,14 @@ class CaseReader {
     note(follows_late(scene) && given("time", "first_step_us") && time.first_step_us == 0,
          "time.first_step_us = 0: with membrane viscosity in a fluid that is everywhere the first steps follow a load late, and "
          "what they leave lasts: leave the key out, for short ones, or reduce time.step_us");
+  }
+
+  static void note_sharp_aggregation(Case& scene) {
+    if (!scene.coupling || scene.coupling->pressure != CouplingSettings::Pressure::sharp) return;
+    if (!scene.contact || !(scene.contact->aggregation_energy > 0)) return;
+    scene.remarks.push_back("coupling.pressure = \"sharp\" with contact.aggregation_energy_fJ_per_um2: a sharp pressure takes normal loads as means over "
+                            "neighbouring vertices, and aggregation acts on few; of its work a fifth (two cells) to four fifths (a pack that starts pressed) is not "
+                            "accounted for, whatever the step: use coupling.pressure = \"spread\"");
   }
 
   static void note_often_history(Case& scene) {

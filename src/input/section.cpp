@@ -95,7 +95,7 @@ int Section::integer(const std::string& key, int low, int high, std::optional<in
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, allowed), low;
   if (found && (!found->is_integer() || *found->value<std::int64_t>() < low || *found->value<std::int64_t>() > high))
-    fail(key, "must be " + allowed);
+    fail(key, "must be " + allowed + (found->is_floating_point() ? ", written without a decimal point or exponent" : ""));
   const int value = found ? static_cast<int>(*found->value<std::int64_t>()) : *fallback;
   echo_line(key, std::to_string(value));
   return value;

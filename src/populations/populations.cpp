@@ -79,8 +79,9 @@ class Packer {
       share += wanted_[p] * cell_volume(p) / volume_;
       balls += wanted_[p] * 4.0 / 3 * std::acos(-1.0) * std::pow(shapes_[types_[p]].radius(), 3) / volume_;
     }
-    if (share > most_share) throw InputError(fmt::format("{}: its cells alone would be {:.2f} of the fluid's volume, more than fit in any way: "
-                                              "ask for less", amount(scene_.populations[0], 0), share));
+    if (share > most_share) throw InputError(fmt::format("{}: {} alone would be {:.2f} of the fluid's volume, more than fit in any way: ask for less",
+                                                     amount(scene_.populations[0], 0),
+                                                     types_.size() > 1 ? "the cells of all populations" : "its cells", share));
     constexpr double loose = 0.15;  // of the volume, of balls around them: chance finds places for these at once
     // Rounded, since the volume's last bits depend on the ranks that sum it up.
     scale_ = std::min(1.0, 1e-3 * std::floor(1e3 * std::cbrt(loose / balls)));

@@ -276,6 +276,11 @@ TEST_CASE("a surface that passes through itself is refused with the place") {
     CHECK(std::hypot(found->at[0], found->at[1]) < 1.5);
     CHECK(std::abs(found->at[2]) < 0.1);
   }
+  SECTION("edges that meet edges exactly") {
+    TriangleMesh through = octasphere(3);
+    for (auto& p : through.vertices) p[2] -= p[2] > 0 && std::hypot(p[0], p[1]) < 0.5 ? 2.2 : 0;  // what is above lies over what is below
+    CHECK(find_self_crossing(through));
+  }
   SECTION("neighbours folded onto each other") {
     TriangleMesh box{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {1, 1, 0}, {1, 1, 2}},
                      {{1, 0, 4}, {2, 1, 4}, {3, 2, 4}, {0, 3, 4}, {0, 1, 5}, {1, 2, 5}, {2, 3, 5}, {3, 0, 5}}};
