@@ -121,12 +121,12 @@ double ForceCoupling::anticipated_reaction(double dt) const {
 /// Of what changed in the last step, for the next. With all of it nothing would be late, but what is wrong at first, late by n steps
 /// without it, would swing for as long; with `most` it dies away in ten steps, and what grows is late by n / 10. In steps shorter than
 /// the fluid inside and around a cell takes to follow its membrane, the fluid's velocity is that of several steps together, and what
-/// they changed comes on top of itself: more than a half of it grows by up to a tenth a step (of plane waves along a viscous membrane
-/// in a grid, 0.6 can be stood in steps of 0.05 of that time).
+/// they changed comes on top of itself: with more than is carried on here it grows, by up to a tenth a step (found of plane waves along
+/// a viscous membrane in a grid, for radii, viscosities and spacings of cells and steps 500 times apart).
 double ForceCoupling::carried_on(double dt) const {
-  constexpr double least = 0.4, most = 0.9;
+  constexpr double least = 0.45, most = 0.9;
   const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;
-  const double to_follow = 0.25 * rho * softest_.radius * softest_.radius / mu;
+  const double to_follow = 0.14 * rho * softest_.radius * softest_.radius / mu;
   return std::clamp(1 - to_follow / dt, least, most);
 }
 
