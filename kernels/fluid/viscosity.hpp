@@ -22,7 +22,7 @@ struct VaryingViscosity {
   Components<double> excess[3];  // [cell, 3] of find_excess(), on faces that are marked
   Components<double> force;      // [cell, 3] the same, of whole cells: zero where none is marked
 
-  static constexpr unsigned char face_mark(int d) { return 1 << d; }
+  KOKKOS_INLINE_FUNCTION static constexpr unsigned char face_mark(int d) { return 1 << d; }
   static constexpr unsigned char cell_mark = 1 << 3;
 };
 

@@ -269,15 +269,15 @@ SceneSize measure_scene(const Case& scene, int ranks) {
   return size;
 }
 
-/// Of the piece of a grid in which plasma alone is solved for, which the first rank has besides.
+/// With its halo, of the piece of a grid in which plasma alone is solved for: one rank has it.
 double plasma_cells(const Case& scene, const SceneSize& size) {
   if (!scene.blood || !scene.grid || !scene.fluid || scene.fluid->pressure_gradient_Pa_per_um == Triple{} || scene.boundaries.size() != 6)
     return 0;
-  std::array<bool, 3> unchanged{false, false, true};
-  if (scene.grid->generator == GridSettings::Generator::box)
-    for (const BoundarySettings& side : scene.boundaries)
-      unchanged[static_cast<int>(side.side) / 2] = side.type == BoundarySettings::Type::periodic;
-  if (scene.grid->generator == GridSettings::Generator::file || unchanged == std::array<bool, 3>{true, true, true}) return 0;
+  std::array<bool, 3> unchanged{};
+  for (const BoundarySettings& side : scene.boundaries) unchanged[static_cast<int>(side.side) / 2] = side.type == BoundarySettings::Type::periodic;
+  const bool tube = scene.grid->generator == GridSettings::Generator::straight_tube && unchanged[2];
+  const bool walls = scene.grid->generator == GridSettings::Generator::box && unchanged != std::array<bool, 3>{true, true, true};
+  if (!tube && !walls) return 0;
   std::array<int, 3> cells{};
   for (int d = 0; d < 3; ++d) cells[d] = static_cast<int>(size.cells[d]);
   double padded = 1;
@@ -313,7 +313,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
     mb.fields = (nodes * (grid + solver + krylov + search + cytosol + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
     mb.multigrid = nodes * cycles * levels_over_finest(size) / bytes_per_mb;
     if (size.skewed) mb.pressure_matrix = owned * matrix / bytes_per_mb;
-    mb.output += plasma_cells(scene, size) * (grid + solver + krylov + conjugate_gradients + 2 * cycles + (size.skewed ? matrix : 0)) / bytes_per_mb;
+    mb.output += plasma_cells(scene, size) / ranks * (grid + solver + krylov + conjugate_gradients + 2 * cycles + (size.skewed ? matrix : 0)) / bytes_per_mb;
     // A vector of every node in the order of the file, on the device and on the host.
     mb.output += owned * 2 * 24 / bytes_per_mb;
     // A grid from a file: all its nodes, on every rank, while the geometry is made.

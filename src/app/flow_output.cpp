@@ -80,9 +80,13 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
 #endif
 }
 
-/// Whether this step is the last, or the first at or after a multiple of `every_us`.
+/// Whether it is that, or the last.
 bool FlowOutput::due(double every_us) const {
-  if (simulation_.done() || simulation_.at_outflow()) return true;
+  return simulation_.done() || simulation_.at_outflow() || passed(every_us);
+}
+
+/// Whether it is the first at or after a multiple of `every_us`.
+bool FlowOutput::passed(double every_us) const {
   if (every_us <= 0) return false;
   const double step = simulation_.last_step_us(), now = simulation_.time();
   return std::floor(now / every_us + 1e-9) > std::floor((now - step) / every_us + 1e-9);
@@ -132,7 +136,13 @@ void FlowOutput::after_step(bool start) {
   if (written || regular()) {
     if (history_) measure_bodies();
     if (history_ && written) history_->write();
+    const EnergyBalance::State before = energy_.state();
     energy_.sample(history_ ? history_->elastic_energy() : 0);
+    // As in sample_flow(): what a run takes at its end alone is not there for one that goes on.
+    if (!start && !regular() && output.history_every_us > 0 && !passed(output.history_every_us)) {
+      end_energy_ = energy_.state();
+      energy_.resume(before);
+    }
   }
   if (!start) sample_flow();
   if (!start) sample_blood();
@@ -277,6 +287,7 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
 }
 
 void FlowOutput::fill_broken(Report& report, bool together) {
+  if (end_energy_) energy_.resume(*end_energy_);
   fill_totals(report, totals_now(together));
   judge_figures(record(), report);
 }
@@ -301,6 +312,7 @@ void FlowOutput::fill_blood_quantities(Report& report) const {
 }
 
 void FlowOutput::fill(Report& report) {
+  if (end_energy_) energy_.resume(*end_energy_);
   const RunTotals totals = totals_now();
   fill_totals(report, totals);
   fill_blood(report, totals.contact);

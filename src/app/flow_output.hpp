@@ -41,6 +41,7 @@ class FlowOutput {
 
  private:
   bool due(double every_us) const;
+  bool passed(double every_us) const;
   bool regular() const;
   void sample_flow();
   void gather();
@@ -76,6 +77,7 @@ class FlowOutput {
   Components<double> wall_stress_;
   RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
   std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
+  std::optional<EnergyBalance::State> end_energy_;  // the same
   std::chrono::steady_clock::time_point start_;
   EnergyBalance energy_;
 };

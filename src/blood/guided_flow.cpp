@@ -240,21 +240,10 @@ std::array<bool, 3> unchanged(const GuidedFlow& flow) {
 }  // namespace
 
 std::array<int, 3> plasma_piece(const std::array<int, 3>& cells, const std::array<bool, 3>& unchanged) {
-  constexpr int few = 4, coarse = 12, most = 1 << 18;
+  constexpr int few = 4;
   std::array<int, 3> piece = cells;
-  int across = 0, free = 0;
-  double section = 1;
-  for (int d = 0; d < 3; ++d) {
-    free += unchanged[d];
-    if (!unchanged[d]) across = std::max(across, cells[d]), section *= cells[d];
-  }
-  // So long as to be coarsened as often as the cross-section has to be: what is left is then solved directly. Not where the section
-  // is large: what holds it must be small beside a rank's part of the scene.
-  int longest = IndexSpace::halo;
-  for (int n = across; n > coarse; n = (n + 1) / 2) longest *= 2;
-  const int along = free == 1 && section * longest <= most ? longest : few;
   for (int d = 0; d < 3; ++d)
-    if (unchanged[d]) piece[d] = std::min(along, cells[d]);
+    if (unchanged[d]) piece[d] = few;
   return piece;
 }
 
@@ -266,15 +255,17 @@ double solved_plasma_speed(const Case& scene, const GuidedFlow& flow) {
   std::array<bool, 3> periodic{};
   std::array<int, 3> cells{};
   for (int d = 0; d < 3; ++d) periodic[d] = side_of(scene, 2 * d).type == Type::periodic, cells[d] = piece.nodes[d] - 1;
-  const std::array<int, 3> few = plasma_piece(cells, unchanged(flow));
+  // Long cells along the flow: what does not change along it does not depend on their length, and multigrid coarsens the section alone.
+  const std::array<bool, 3> along = unchanged(flow);
+  const std::array<int, 3> few = plasma_piece(cells, along);
   for (int d = 0; d < 3; ++d) {
-    if (few[d] == cells[d]) continue;
-    const double share = static_cast<double>(few[d]) / cells[d];
+    if (!along[d]) continue;
     piece.nodes[d] = few[d] + 1;
+    const double length = few[d] * flow.frame.width;
     if (flow.frame.tube())
-      piece.length_um *= share;
+      piece.length_um = length;
     else
-      piece.upper_um[d] = piece.lower_um[d] + share * (piece.upper_um[d] - piece.lower_um[d]);
+      piece.upper_um[d] = piece.lower_um[d] + length;
   }
   FluidSettings settings = *scene.fluid;
   settings.convection = FluidSettings::Convection::none;

@@ -32,8 +32,8 @@ std::string why_unguided(const Case& scene);
 /// Cells along each direction of a piece of a grid in which plasma alone is solved for. @param unchanged  along which it flows alike
 std::array<int, 3> plasma_piece(const std::array<int, 3>& cells, const std::array<bool, 3>& unchanged);
 
-/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a short piece of the same
-/// grid, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank calls; the first one has
+/// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same
+/// grid a few cells long, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank calls; the first one has
 /// the piece. @pre flow.gradient is not 0
 /// @throws ComputationError  on all ranks
 double plasma_speed(const Comm& comm, const Case& scene, const GuidedFlow& flow);

@@ -34,9 +34,9 @@ Case without_cells(const Case& scene) {
 /// of a cell beyond the halo, depends on what is within the slip's reach of it.
 double contact_reach(const Case& scene, const Grid& grid) {
   if (!scene.contact) return 0;
-  const double farthest = FourPointDelta::reach + 0.5 + slip_reach - IndexSpace::halo;  // spacings
+  constexpr double beyond_halo = FourPointDelta::reach + 0.5 - IndexSpace::halo;  // spacings, less than none
   return std::max({scene.contact->range_um, scene.contact->aggregation_energy > 0 ? scene.contact->aggregation_range_um : 0.0,
-                   scene.coupling->slip ? farthest * grid.largest_spacing() : 0.0});
+                   scene.coupling->slip ? slip_reach * grid.largest_spacing() + beyond_halo * grid.smallest_spacing() : 0.0});
 }
 
 }  // namespace

@@ -84,6 +84,20 @@ TEST_CASE("a checkpoint goes on on any number of ranks, and on the same number w
 #endif
 }
 
+TEST_CASE("energies of a run that stopped between samples are those of one that did not") {
+  const auto folder = fresh_folder("restart_energy");
+  const auto run = [&](const std::string& out, const std::string& end, const Words& more) {
+    succeed(folder, with({"run", scene("capsule_shear"), "--out", out}, {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0",
+                                                                         "output.history_every_us=5000", "time.end_us=" + end}),
+            {});
+    if (!more.empty())
+      succeed(folder, restarted(with({"run", scene("capsule_shear"), "--out", out}, more), out));
+  };
+  run("whole", "3200", {});
+  run("parts", "1300", {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0", "output.history_every_us=5000", "time.end_us=3200"});
+  CHECK(report(folder / "parts")["energy_fJ"] == report(folder / "whole")["energy_fJ"]);
+}
+
 TEST_CASE("a restart refuses another geometry, and says which other keys have changed") {
   static const auto folder = fresh_folder("restart_changes");
   static const bool ready = (succeed(folder, coarse_tube("good", {"time.end_us=2"})), true);

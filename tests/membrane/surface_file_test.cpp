@@ -293,6 +293,7 @@ TEST_CASE("a surface that passes through itself is refused with the place") {
 
 TEST_CASE("surfaces that do not cross themselves are left alone, of whatever triangles") {
   CHECK_FALSE(find_self_crossing(biconcave_mesh(500)));
+  CHECK_FALSE(find_self_crossing(scaled(octasphere(4), {1, 1, 1e-3})));  // what is above lies over what is below, and near it
   CHECK_FALSE(find_self_crossing(moved(scaled(octasphere(4), {1, 1, 9}), {1e4, 0, 0})));
   // A cube of twelve triangles, one of them cut into 3000: very unlike sizes.
   TriangleMesh cube{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
