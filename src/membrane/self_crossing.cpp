@@ -151,10 +151,6 @@ class Search {
   double bin_ = 0;
 };
 
-}  // namespace
-
-namespace {
-
 /// By a billionth of its largest coordinate, the same each time: edges that met edges exactly, as those of a symmetric mesh do, go
 /// past each other then or through each other's triangles.
 TriangleMesh shaken(TriangleMesh mesh) {

@@ -187,7 +187,7 @@ TEST_CASE("what comes up behind a cell takes slip from it on the ranks that have
   scene.time = {1, 90};
   const double off = largest_difference(run(Comm::alone(), scene).x, run(Comm(), scene).x);
   if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("differ by {:.2e} um", off));
-  CHECK(off < 1e-8);
+  CHECK(off < 1e-8);  // um; 1e-5 with copies that reach no farther than contact, 1e-13 with these
 }
 
 TEST_CASE("in a tube slip is held where strain stiffens, on any number of ranks alike", "[coupling][cells][ranks]") {
