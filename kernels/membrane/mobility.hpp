@@ -5,12 +5,11 @@
 
 namespace corpuscle {
 
-/// Vertices as blobs in an unbounded fluid (Rotne & Prager, J. Chem. Phys. 50, 1969; Yamakawa, ibid. 53, 1970), and a slip of
-/// `slip` times the tangential force per area.
+/// Vertices as blobs in an unbounded fluid (Rotne & Prager, J. Chem. Phys. 50, 1969; Yamakawa, ibid. 53, 1970), and each one's slip.
 struct MobilityModel {
   double viscosity = 1;  // mPa s
   double radius = 1;     // um, of a blob
-  double slip = 0;       // um
+  Components<double> slip[3];  // [vertex, 3] um, columns of what makes slip of force, times viscosity and area; without values none
   double dipole = 0, width = 1;  // um: how far the dipoles of forces take the membrane along, and what they are smeared over
 };
 
@@ -33,6 +32,22 @@ KOKKOS_INLINE_FUNCTION Vec3 blob_velocity(const MobilityModel& model, const Vec3
          ((1 + 2 * square / 3) * f + ((1 - 2 * square) * dot(r, f) / (distance * distance)) * r);
 }
 
+/// w.mode = `values` [vertex, 3] of the vertices of `cell`; their squared norm goes to the sums.
+inline void take_mode(const Components<double>& values, int cell, int first, int last, const StiffnessViews& w) {
+  double total = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::membrane::take_mode", Policy(first, last),
+      KOKKOS_LAMBDA(int i, double& sum) {
+        const Vec3 v = load(values, i);
+        store(w.mode, i, v);
+        sum += dot(v, v);
+      },
+      total);
+  Kokkos::parallel_for(
+      "corpuscle::membrane::mode_sums", Policy(0, sections),
+      KOKKOS_LAMBDA(int s) { w.sums(cell * sections + s, 0) = s == 0 ? total : 0; });
+}
+
 /// w.mode = the velocities that the forces w.mode [vertex, 3] give to the vertices of `cell`; w.probe is overwritten, the
 /// squared norm goes to the sums. Normals and areas must be current.
 inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility, int cell, int first, int last,
@@ -43,7 +58,9 @@ inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility
   Kokkos::parallel_for(
       "corpuscle::membrane::mobility", Policy(first, last), KOKKOS_LAMBDA(int i) {
         const Vec3 at = load(x, i), f = load(w.mode, i), n = load(normal, i);
-        Vec3 v = (model.slip / (model.viscosity * area(i))) * (f - dot(f, n) * n);
+        Vec3 v;
+        if (model.slip[0].extent(0) > 0)
+          for (int d = 0; d < 3; ++d) v += (f[d] / (model.viscosity * area(i))) * load(model.slip[d], i);
         for (int j = first; j < last; ++j) {
           const Vec3 r = at - load(x, j), of_j = load(w.mode, j);
           v += blob_velocity(model, r, of_j);
@@ -51,18 +68,7 @@ inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility
         }
         store(w.probe, i, v);
       });
-  double total = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::membrane::mobility_norm", Policy(first, last),
-      KOKKOS_LAMBDA(int i, double& sum) {
-        const Vec3 v = load(w.probe, i);
-        store(w.mode, i, v);
-        sum += dot(v, v);
-      },
-      total);
-  Kokkos::parallel_for(
-      "corpuscle::membrane::mobility_sums", Policy(0, sections),
-      KOKKOS_LAMBDA(int s) { w.sums(cell * sections + s, 0) = s == 0 ? total : 0; });
+  take_mode(w.probe, cell, first, last, w);
 }
 
 }  // namespace corpuscle

@@ -1,6 +1,9 @@
 // The slip correction: a membrane that a kernel smears out is hydrodynamically too thick.
 #pragma once
 
+#include <utility>
+
+#include "common/extremes.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "transfer/marker_views.hpp"
 
@@ -155,6 +158,54 @@ inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip,
       "corpuscle::transfer::add_slip", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         const int v = m.vertex(marker);
         if (m.home(marker)) store(of_vertex, v, load(of_vertex, v) + slip_velocity(block, s, m, marker));
+      });
+}
+
+/// The narrowest and the widest spacing along one of the grid's directions where vertices are at home here, um; 1e30 and 0 without any.
+inline std::pair<double, double> spacings_at_markers(const TransferBlock& transfer_block, const MarkerViews& markers) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  double narrowest = 1e30, widest = 0;
+  Kokkos::parallel_reduce(
+      "corpuscle::transfer::narrowest_spacing", Policy(0, m.count),
+      KOKKOS_LAMBDA(int marker, double& least) {
+        Vec3 along[3];
+        tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
+        for (int d = 0; d < 3; ++d)
+          if (m.home(marker)) least = smaller(least, norm(along[d]));
+      },
+      Smallest(narrowest));
+  Kokkos::parallel_reduce(
+      "corpuscle::transfer::widest_spacing", Policy(0, m.count),
+      KOKKOS_LAMBDA(int marker, double& most) {
+        Vec3 along[3];
+        tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
+        for (int d = 0; d < 3; ++d)
+          if (m.home(marker)) most = larger(most, norm(along[d]));
+      },
+      Largest(widest));
+  return {narrowest, widest};
+}
+
+/// Columns [vertex, 3], um, of the matrix that makes slip of force, times viscosity and area, of the vertices at home here; away from other
+/// surfaces and sides.
+inline void slip_columns(const TransferBlock& transfer_block, const SlipViews& slip, const MarkerViews& markers,
+                         const Components<double> (&columns)[3]) {
+  const TransferBlock block = transfer_block;
+  const MarkerViews m = markers;
+  const SlipViews s = slip;
+  const Components<double> first = columns[0], second = columns[1], third = columns[2];
+  Kokkos::parallel_for(
+      "corpuscle::transfer::slip_columns", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
+        if (!m.home(marker)) return;
+        const int v = m.vertex(marker);
+        Vec3 along[3];
+        tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
+        const Vec3 n = load(s.normal, v);
+        const double between = slip_between(s.law, s.ratio_of(v));
+        store(first, v, between * slip_motion(s.law, along, n, Vec3{1, 0, 0} - n[0] * n));
+        store(second, v, between * slip_motion(s.law, along, n, Vec3{0, 1, 0} - n[1] * n));
+        store(third, v, between * slip_motion(s.law, along, n, Vec3{0, 0, 1} - n[2] * n));
       });
 }
 

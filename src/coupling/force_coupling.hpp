@@ -122,8 +122,8 @@ class ForceCoupling : public Coupling {
   double packed_gap_ = 0;                 // um, the least of the populations'
   bool packed_in_box_ = false;            // some are to start within one
   int packed_listed_ = 0;                 // cells of the scene that are not packed
-  double small_stable_us_ = 0;            // stable_us_ and short_waves_ of packed cells before they have grown
-  double small_short_waves_ = 0;
+  double small_stable_us_ = 0;            // stable_us_, short_waves_ and held_rate_ of packed cells before they have grown
+  double small_short_waves_ = 0, small_held_rate_ = 0;
   bool grows_ = false;                    // packed cells are still smaller than they are to be, and must grow
   bool small_ = false;                    // or are about to be replaced by those of a checkpoint
   Membranes* membranes_;                        // theirs
@@ -140,6 +140,7 @@ class ForceCoupling : public Coupling {
   } softest_;
   double stable_us_ = 0;      // largest stable step at the start
   double short_waves_ = 0;    // share of membrane viscosity that the fluid's answer to short waves is taken for
+  double held_rate_ = 0;      // 1/us, fastest at which membranes relax against their own viscosity
   double outflow_limit_ = 0;  // um
   NearSide outflow_;          // at the last place()
 };

@@ -69,7 +69,7 @@ std::string gap_text(double gap, double seen) {
 /// Of packed cells that have grown: a restart begins with them as small as packing did.
 std::vector<double> ForceCoupling::state() const {
   if (!packed_ || packed_->size == 1) return {};
-  return {stable_us_, softest_.area, softest_.radius, small_stable_us_, short_waves_, small_short_waves_};
+  return {stable_us_, softest_.area, softest_.radius, small_stable_us_, short_waves_, small_short_waves_, held_rate_, small_held_rate_};
 }
 
 /// What is found of the grown cells, which are not at hand: it changes with properties as that of the small ones does.
@@ -84,9 +84,16 @@ void ForceCoupling::set_state(const std::vector<double>& state) {
   stable_us_ = of_grown(small_stable_us_, state.at(3), state.at(0));
   small_short_waves_ = short_waves_;
   if (short_waves_ > 0 && state.size() > 5 && state[5] > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
+  small_held_rate_ = held_rate_;
+  if (held_rate_ > 0 && state.size() > 7 && state[7] > 0) held_rate_ = of_grown(small_held_rate_, state.at(7), state.at(6));
   membranes_->take_share_of_resistance(short_waves_);
-  softest_.area = state.at(1);
-  softest_.radius = state.at(2);
+  if (state.at(1) > 0) {
+    softest_.area = state.at(1);
+    softest_.radius = state.at(2);
+  } else {  // without membrane viscosity nobody has asked
+    softest_.area /= packed_->size * packed_->size;
+    softest_.radius /= packed_->size;
+  }
   refuse_long_steps();
 }
 
@@ -135,6 +142,7 @@ void ForceCoupling::inflate() {
     measure_stability();
     small_stable_us_ = stable_us_;
     small_short_waves_ = short_waves_;
+    small_held_rate_ = held_rate_;
     still();
     loads_->look(0, pace_us);
     long step = 0;

@@ -23,13 +23,6 @@ double mean_spacing(const Grid& grid, int d) {
   return grid.total_volume() / grid.comm().sum(swept);
 }
 
-/// The least and the greatest of the mean spacings along the grid's directions.
-std::pair<double, double> spacings(const Grid& grid) {
-  const double along[3] = {mean_spacing(grid, 0), mean_spacing(grid, 1), mean_spacing(grid, 2)};
-  const auto [least, most] = std::minmax_element(along, along + 3);
-  return {*least, *most};
-}
-
 }  // namespace
 
 /// @throws InputError
@@ -44,8 +37,9 @@ void ForceCoupling::refuse_long_steps() const {
                     scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 
-/// Of the largest stable step: up to there steps are of second order.
-constexpr double second_order_share = 0.54;
+/// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on (spheres and red cells, 0.4 to
+/// 1.2 spacings an edge: sound up to 0.64, growing from 0.73).
+constexpr double second_order_share = 0.6;
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
 /// mean of the velocities at both ends: second order. Longer steps than half the largest stable one would swing then: those are
@@ -80,25 +74,31 @@ void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std
 /// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two.
 void ForceCoupling::measure_stability() {
   constexpr double limit = 1.5, of_dipoles = 2;
-  const auto [narrowest, widest] = spacings(fluid_.grid());
   update_surface_geometry(surfaces());
+  transfer_->place(surfaces().x);
+  const Comm& comm = fluid_.grid().comm();
+  const auto [narrowest_here, widest_here] = spacings_at_markers(transfer_->block(), transfer_->views());
+  const double narrowest = comm.min(narrowest_here), widest = comm.max(widest_here);
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * narrowest;
   if (scene_.coupling->slip) {
-    model.slip = slip_of_membranes().law.coefficient * transfer_->largest_slip() * widest;
+    for (auto& column : model.slip) column = Components<double>("corpuscle::coupling::slip", surfaces().vertices, 3);
+    slip_columns(transfer_->block(), slip_of_membranes(), transfer_->views(), model.slip);
+    for (auto& column : model.slip) cells_->add_copies(column);
     model.dipole = of_dipoles * transfer_->largest_dipole() * resisting_share() * widest;
     model.width = 0.8 * narrowest;
   }
   // Of each type the same cell on any number of ranks: what slip is held to goes by this.
   std::vector<int> numbers = membranes_->first_of_types();
-  for (int& number : numbers) number = static_cast<int>(fluid_.grid().comm().min(number));
+  for (int& number : numbers) number = static_cast<int>(comm.min(number));
   // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
   const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
   anticipate_short_waves(model, numbers);
+  held_rate_ = comm.max(membranes_->fastest_held_relaxation_per_us(numbers, beta));
   const double fastest =
       std::max(membranes_->fastest_relaxation_per_us(model, numbers, beta), loads_ ? loads_->fastest_relaxation_per_us() : 0);
-  stable_us_ = limit / fluid_.grid().comm().max(fastest);
+  stable_us_ = limit / comm.max(fastest);
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
@@ -127,12 +127,15 @@ double ForceCoupling::anticipated_reaction(double dt) const {
 /// without it, would swing for as long; with `most` it dies away in ten steps, and what grows is late by n / 10. In steps shorter than
 /// the fluid inside and around a cell takes to follow its membrane, the fluid's velocity is that of several steps together, and what
 /// they changed comes on top of itself: with more than is carried on here it grows, by up to a tenth a step (found of plane waves along
-/// a viscous membrane in a grid, for radii, viscosities and spacings of cells and steps 500 times apart).
+/// a viscous membrane in a grid, for radii, viscosities and spacings of cells and steps 500 times apart). And in steps that are long
+/// beside the time in which the membrane relaxes against its own viscosity, what it springs back by comes on top: of a mode with
+/// f' = a (f + c (f - f'')) - s x, x' = x + dt m f' (Membranes::fastest_relaxation() has a and s; c is carried on) the largest stable
+/// dt times that rate is 0.15, 0.30, 0.52, 0.78, 1.2 for c = 0.9, 0.8, 0.7, 0.6, 0.45, whatever its mobility and viscosity.
 double ForceCoupling::carried_on(double dt) const {
   constexpr double least = 0.45, most = 0.9;
   const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;
   const double to_follow = 0.14 * rho * softest_.radius * softest_.radius / mu;
-  return std::clamp(1 - to_follow / dt, least, most);
+  return std::max(0.0, std::min(std::clamp(1 - to_follow / dt, least, most), 1 - held_rate_ * dt));
 }
 
 void ForceCoupling::find_softest() {

@@ -279,9 +279,10 @@ double Membranes::fastest_relaxation_per_us(const MobilityModel& model, const st
   return cells.empty() ? 0 : fastest_relaxation(model, cells, beta);
 }
 
-/// Power iteration on mobility times what answer(cells, work) makes of the mode; the cells are those up to the last one asked for.
-template <class Answer>
-double Membranes::largest_response(const MobilityModel& model, const std::vector<int>& cells, const Answer& answer) {
+/// Power iteration on what answer(cells, work) makes of the mode and respond(cell, first, last, work) of that; the cells are those up
+/// to the last one asked for.
+template <class Answer, class Response>
+double Membranes::largest_response(const std::vector<int>& cells, const Answer& answer, const Response& respond) {
   take_geometry();
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
   const MembraneViews up_to_last = up_to(views_, cells.back() + 1, first(cells.back() + 1));
@@ -289,7 +290,7 @@ double Membranes::largest_response(const MobilityModel& model, const std::vector
   start_mode(up_to_last, work);
   for (int i = 0; i < power_iterations; ++i) {
     answer(up_to_last, work);
-    for (int c : cells) apply_mobility(views_, model, c, first(c), first(c + 1), work);
+    for (int c : cells) respond(c, first(c), first(c + 1), work);
   }
   forget_geometry();
   return largest_of(work, cells);
@@ -298,8 +299,33 @@ double Membranes::largest_response(const MobilityModel& model, const std::vector
 double Membranes::largest_resistance(const MobilityModel& model, const std::vector<int>& numbers) {
   const std::vector<int> cells = cells_of(numbers);
   if (cells.empty() || !viscosity_) return 0;
-  return largest_response(model, cells,
-                          [this](const MembraneViews& m, const StiffnessViews& work) { viscosity_->damp(m, *workspace_, work); });
+  return largest_response(
+      cells, [this](const MembraneViews& m, const StiffnessViews& work) { viscosity_->damp(m, *workspace_, work); },
+      [&](int c, int first, int last, const StiffnessViews& work) { apply_mobility(views_, model, c, first, last, work); });
+}
+
+/// Power iteration on (R + D) under stiffness, R what MembraneViscosity takes for the fluid's resistance.
+double Membranes::fastest_held_relaxation_per_us(const std::vector<int>& numbers, double beta) {
+  const std::vector<int> cells = cells_of(numbers);
+  if (cells.empty() || !viscosity_ || !workspace_ || beta <= 0) return 0;
+  return largest_response(
+      cells,
+      [&](const MembraneViews& up_to_last, const StiffnessViews& work) {
+        elastic_answer(up_to_last, work);
+        viscosity_->relieve(up_to_last, *workspace_, beta, work);
+        take_workspace();
+      },
+      [](int c, int first, int last, const StiffnessViews& work) { take_mode(work.force_ahead, c, first, last, work); });
+}
+
+/// work.mode = the forces that the unit mode is met with; the other arrays are overwritten.
+void Membranes::elastic_answer(const MembraneViews& m, const StiffnessViews& work) {
+  constexpr double distance = 1e-4;  // um, as for the stiffness
+  displace(m, work, distance);
+  elasticity_->membrane_forces(m, work.probe, work.force_ahead, parts_);
+  displace(m, work, -distance);
+  elasticity_->membrane_forces(m, work.probe, work.force_behind, parts_);
+  difference_forces(m, work, distance);
 }
 
 void Membranes::take_share_of_resistance(double share) {
@@ -310,18 +336,16 @@ void Membranes::take_share_of_resistance(double share) {
 /// the force follows f' = (l (1 - b m) f - b k x) / (b + l), b = beta A: Euler's steps are stable up to 2 / (m k) (1 + l (2 / b - m)),
 /// which is at least 2 (b + l) / (b m k) as long as b m < 1. Such a mode relaxes as if at rates b / (b + l) times as fast.
 double Membranes::fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta) {
-  constexpr double distance = 1e-4;  // um, as for the stiffness
   const bool viscous = viscosity_ && workspace_ && beta > 0;
-  return largest_response(model, cells, [&](const MembraneViews& up_to_last, const StiffnessViews& work) {
-    displace(up_to_last, work, distance);
-    elasticity_->membrane_forces(up_to_last, work.probe, work.force_ahead, parts_);
-    displace(up_to_last, work, -distance);
-    elasticity_->membrane_forces(up_to_last, work.probe, work.force_behind, parts_);
-    difference_forces(up_to_last, work, distance);
-    if (!viscous) return;
-    viscosity_->relieve(up_to_last, *workspace_, beta, work);
-    take_workspace();
-  });
+  return largest_response(
+      cells,
+      [&](const MembraneViews& up_to_last, const StiffnessViews& work) {
+        elastic_answer(up_to_last, work);
+        if (!viscous) return;
+        viscosity_->relieve(up_to_last, *workspace_, beta, work);
+        take_workspace();
+      },
+      [&](int c, int first, int last, const StiffnessViews& work) { apply_mobility(views_, model, c, first, last, work); });
 }
 
 int Membranes::trouble() {

@@ -171,6 +171,10 @@ class Membranes {
   /// @param beta     of resist(), for membranes whose viscosity slows them down, but for hold() not at all; before the first step
   double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta = 0);
 
+  /// Fastest rate at which a membrane relaxes against its own viscosity and what resist() takes for the fluid's resistance, 1/us; 0
+  /// without viscosity. As above.
+  double fastest_held_relaxation_per_us(const std::vector<int>& numbers, double beta);
+
   /// Largest ratio of membrane viscosity to what the fluid answers to a wave along a membrane; 0 without cells or viscosity. As above.
   double largest_resistance(const MobilityModel& model, const std::vector<int>& numbers);
 
@@ -212,8 +216,9 @@ class Membranes {
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
   std::vector<int> cells_of(const std::vector<int>& numbers) const;
-  template <class Answer>
-  double largest_response(const MobilityModel& model, const std::vector<int>& cells, const Answer& answer);
+  template <class Answer, class Response>
+  double largest_response(const std::vector<int>& cells, const Answer& answer, const Response& respond);
+  void elastic_answer(const MembraneViews& m, const StiffnessViews& work);
   double fastest_relaxation(const MobilityModel& model, const std::vector<int>& cells, double beta);
   [[noreturn]] void explain(int cell, double dt);
   [[noreturn]] void explain_area(int cell, double drift) const;

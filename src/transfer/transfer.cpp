@@ -336,13 +336,6 @@ SlipViews Transfer::slip(const SurfaceSet& surface, const Components<double>& fo
   return {law_of_slip(), viscosity, force, surface.normal, surface.area, gap, followed, surface.vertex_body, type, ratio};
 }
 
-double Transfer::largest_slip() const {
-  const SlipLaw law = law_of_slip();
-  double most = ratios_.empty() ? 1 : 0;
-  for (double ratio : ratios_) most = std::max(most, corpuscle::slip_between(law, ratio));
-  return most;
-}
-
 double Transfer::largest_dipole() const {
   double most = 0;
   for (double ratio : ratios_) {

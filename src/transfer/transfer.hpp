@@ -55,8 +55,6 @@ class Transfer {
   /// @param followed  [vertex, 1] share of the force that the slip follows; without values all of it
   SlipViews slip(const SurfaceSet& surface, const Components<double>& force, double viscosity, const Array<int>& type = {},
                  const Array<double>& gap = {}, const Components<double>& followed = {}) const;
-  /// Of the slip in one fluid, the largest share that those of slip_between() leave.
-  double largest_slip() const;
   /// How far dipoles that take off kinks move a membrane, times the viscosity outside over the force per area and the spacing: the square
   /// of what velocity and force each take along of a shear, which both fluids resist half.
   double largest_dipole() const;

@@ -84,9 +84,9 @@ TEST_CASE("bars of packed cells are of the step alone, say so, and hold for bloo
 
 TEST_CASE("where a longer step is not possible half of it gives the error bars") {
   const auto folder = fresh_folder("bars_of_half_steps");
-  const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=60", "time.end_us=120", "output.every_us=0", "output.history_every_us=60"};
+  const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=50", "time.end_us=100", "output.every_us=0", "output.history_every_us=50"};
   const auto outcome = succeed(folder, with({"run", scene("two_cells"), "--out", "out", "--estimate-error=step"}, coarse));
-  CHECK_THAT(outcome.output, Contains("no longer step: time.step_us: steps of 120 us are too long") && Contains("the same with time.step_us=30") &&
+  CHECK_THAT(outcome.output, Contains("no longer step: time.step_us: steps of 100 us are too long") && Contains("the same with time.step_us=25") &&
                                  Contains("+-"));
   const auto r = report(folder / "out");
   REQUIRE(r["error_estimate"].size() == 1);

@@ -98,6 +98,20 @@ TEST_CASE("energies of a run that stopped between samples are those of one that 
   CHECK(report(folder / "parts")["energy_fJ"] == report(folder / "whole")["energy_fJ"]);
 }
 
+TEST_CASE("cells that have grown in packing take up membrane viscosity at a restart") {
+  const auto folder = fresh_folder("restart_viscous");
+  const auto run = [&](const std::string& out, const std::string& end, const Words& more) {
+    const Words common{"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "output.every_us=0", "time.step_us=5", "time.first_step_us=5",
+                       "time.end_us=" + end};
+    return with(with({"run", scene("single_file"), "--out", out}, common), more);
+  };
+  succeed(folder, run("out", "20", {}));
+  succeed(folder, restarted(run("viscous", "60", {"cell_types.0.membrane_viscosity_N_s_per_m=1e-7"}), "out/checkpoint.h5"));
+  const auto& energy = report(folder / "viscous")["energy_fJ"];
+  CHECK(energy["membrane_dissipation"] > 0);
+  CHECK(report(folder / "viscous")["errors"]["area_drift"] < 0.03);
+}
+
 TEST_CASE("a restart refuses another geometry, and says which other keys have changed") {
   static const auto folder = fresh_folder("restart_changes");
   static const bool ready = (succeed(folder, coarse_tube("good", {"time.end_us=2"})), true);

@@ -156,10 +156,13 @@ TEST_CASE("steps too long for a membrane are refused, and the longest that is no
 }
 
 TEST_CASE("steps that are not refused are stable where fluids differ and where spacings do", "[coupling][force]") {
-  const auto [ratio, nodes] = GENERATE(std::pair{0.1, Triple{17, 17, 17}}, std::pair{0.2, Triple{17, 17, 17}}, std::pair{0.2, Triple{25, 7, 25}},
-                                       std::pair{5.0, Triple{25, 7, 25}}, std::pair{1.0, Triple{17, 25, 25}}, std::pair{1.0, Triple{7, 25, 25}});
+  // Meshes that are fine beside the grid relax by slip alone, which is largest where no direction of the grid is along the normal.
+  const auto [ratio, nodes, vertices] = GENERATE(std::tuple{0.1, Triple{17, 17, 17}, 500}, std::tuple{0.2, Triple{17, 17, 17}, 500},
+                                                 std::tuple{0.2, Triple{25, 7, 25}, 500}, std::tuple{5.0, Triple{25, 7, 25}, 500},
+                                                 std::tuple{1.0, Triple{17, 25, 25}, 500}, std::tuple{1.0, Triple{7, 25, 25}, 500},
+                                                 std::tuple{1.0, Triple{21, 21, 21}, 1500});
   ShearedCapsule capsule;
-  capsule.viscosity_ratio = ratio;
+  capsule.viscosity_ratio = ratio, capsule.vertices = vertices;
   Case scene = capsule.scene(1);
   for (int d = 0; d < 3; ++d) scene.grid->nodes[d] = static_cast<int>(nodes[d]);
   scene.time = {1e6, 1e6};
@@ -169,7 +172,7 @@ TEST_CASE("steps that are not refused are stable where fluids differ and where s
   scene.cells[0].start_stretch = {1.02, 1, 1 / 1.02};
   for (int side : {2, 3}) scene.boundaries[side].velocity = Triple{0, 0, 0};
   // At rest it goes back from 1.02, on the widest spacings by way of 1.0231 at some triangles; what swings grows beyond.
-  for (const double share : {0.5, 0.95}) {
+  for (const double share : {0.59, 0.95}) {  // of second and of first order
     scene.time = {share * longest, share * longest * 80};
     const Run r = run(scene);
     if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("ratio {} on {:g} {:g} {:g}: {:.3g} us, stretch {}", ratio, nodes[0], nodes[1], nodes[2], share * longest, r.stretch));
@@ -202,7 +205,8 @@ TEST_CASE("membrane viscosity slows a membrane down, and lets it take longer ste
 
 TEST_CASE("the fastest relaxation is that of the stiffest of several laws", "[coupling][force]") {
   using Law = CellSettings::Law;
-  const MobilityModel model{1.2, 0.4, 0.1};
+  MobilityModel model;
+  model.viscosity = 1.2, model.radius = 0.4;
   const auto fastest = [&](const std::vector<Law>& laws) {
     std::vector<CellSettings> cells;
     for (Law law : laws) {

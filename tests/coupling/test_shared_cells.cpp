@@ -219,7 +219,7 @@ TEST_CASE("in a tube slip is held where strain stiffens, on any number of ranks 
   }
   scene.coupling = CouplingSettings{};
   scene.coupling->scheme = CouplingSettings::Scheme::force;
-  scene.time = {50, 1000};
+  scene.time = {35, 1050};
   const Outcome shared = run(Comm(), scene);
   Timers timers;
   FlowSimulation simulation(Comm::alone(), scene, timers);
