@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace corpuscle {
 
@@ -32,6 +33,20 @@ FluidSettings fluid_settings(const Case& scene) {
   return settings;
 }
 
+/// A gradient that nothing holds against is no mistake where the start is looked at, and no flow that settles.
+void warn_of_free_fluid(const Case& scene) {
+  using Type = BoundarySettings::Type;
+  const Triple& g = scene.fluid->pressure_gradient_Pa_per_um;
+  const double gradient = std::hypot(g[0], g[1], g[2]);
+  if (gradient == 0 || !scene.bodies.empty() || std::any_of(scene.boundaries.begin(), scene.boundaries.end(), [](const auto& side) {
+        return side.type != Type::periodic && side.type != Type::symmetry;
+      }))
+    return;
+  warn("fluid.pressure_gradient_Pa_per_um: with periodic or symmetry sides all round nothing holds the fluid: it goes ever faster, by {:.3g} "
+       "mm/s in every ms, and means of speeds are of how long the run is; give the grid a wall, or drive it by moving walls",
+       1e3 * gradient / scene.fluid->density_pg_per_um3);
+}
+
 }  // namespace
 
 FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers, const PackedCells* packed)
@@ -41,6 +56,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   check_prescribed_flow(*grid_, scene.boundaries);
   check_courses(scene.boundaries, schedule_);
   check_pressure_gradient(*grid_, scene.fluid->pressure_gradient_Pa_per_um);
+  warn_of_free_fluid(scene);
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (scene.has_cells() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_, packed);
   // After the coupling, which refuses what its membranes do not stand: that is the shorter step, and another remedy.

@@ -79,6 +79,18 @@ void check_populations(const Case& scene, const Complaint& complain) {
   }
 }
 
+/// Forces between vertices along what their velocities differ by have no sum, but a torque: they hold a cell as it turns.
+void check_dissipation(const Case& scene, const Complaint& complain) {
+  if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force) return;
+  const auto check = [&](const std::string& section, const CellSettings& cell) {
+    if (cell.dissipation == CellSettings::Dissipation::full)
+      complain(section, "dissipation", "\"full\" resists turning as well as straining, and a free cell would not turn with the fluid that its "
+               "membrane is part of in coupling.scheme = \"force\": use \"central\", or leave it out");
+  };
+  for (std::size_t c = 0; c < scene.cells.size(); ++c) check(fmt::format("cells.{}", c), scene.cells[c]);
+  for (std::size_t t = 0; t < scene.cell_types.size(); ++t) check(fmt::format("cell_types.{}", t), scene.cell_types[t].cell);
+}
+
 /// What pushes cells from outside must have something that holds them.
 void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const Complaint& complain) {
   Triple sum{};
@@ -155,6 +167,7 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
 
   check_gradient(scene, entry_of, complain);
   check_pushes(scene, entry_of, complain);
+  check_dissipation(scene, complain);
 }
 
 void check_modules(const Case& scene, const Complaint& complain) {

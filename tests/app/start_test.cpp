@@ -117,6 +117,18 @@ TEST_CASE("scenes of membranes as forces that cannot be are refused with what he
   refused("two_cells", {"grid.nodes=[5,5,5]", "time.step_us=10"}, {"the grid is too coarse", "grid.nodes"});
   refused("blood_tube", {"grid.diameter_um=1"}, {"one cell has", "the whole grid", "larger grid"});
   refused("single_file", {"grid.nodes=[15,15,65]", "grid.diameter_um=4"}, {"not even one of its cells fits", "um across", "grid.diameter_um, now 4"});
+  refused("cell_shear", {"cells.0.dissipation=full"}, {"cells.0.dissipation", "would not turn", "\"central\""});
+}
+
+TEST_CASE("a gradient that nothing holds against is warned of, once") {
+  const auto folder = fresh_folder("free_fluid");
+  const auto check = [&](const Words& sides) {
+    const Words common{"grid.nodes=[17,17,17]", "time.step_us=5", "fluid.pressure_gradient_Pa_per_um=[-0.1,0,0]", "cells.0.push_nN=[0,0,0]",
+                       "cells.1.push_nN=[0,0,0]"};
+    return succeed(folder, with(with({"check", scene("two_cells")}, common), sides)).output;
+  };
+  CHECK_THAT(check({}), Contains("nothing holds the fluid") && Contains("100 mm/s in every ms"));
+  CHECK_THAT(check({"boundary.2.type=wall", "boundary.3.type=wall"}), !Contains("nothing holds the fluid"));
 }
 
 TEST_CASE("warnings name the keys of types where cells have types") {
