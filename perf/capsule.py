@@ -93,7 +93,7 @@ def capillary_numbers(runs, table, spacings):
 def small(runs, table, spacings):
     for ratio in (0.2, 1, 5):
         for variant in VARIANTS:
-            until = 0.2 if ratio < 5 else 0.4
+            until = 0.2 if ratio < 5 else 0.8
             found, trouble = runs.run("neo-hookean", 0.01, ratio, spacings, variant, until,
                                       (0.0003 if ratio < 1 else 0.0005) * min(1, 5 / spacings), every=until)
             d = found.get(until)
