@@ -42,7 +42,7 @@ void ForceCoupling::refuse_long_steps() const {
 constexpr double second_order_share = 0.6;
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
-/// mean of the velocities at both ends: second order. Longer steps than half the largest stable one would swing then: those are
+/// mean of the velocities at both ends: second order. Longer steps than two thirds of the largest stable one would swing then: those are
 /// Euler's.
 bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share * stable_us_; }
 

@@ -107,9 +107,9 @@ TEST_CASE("cells that have grown in packing take up membrane viscosity at a rest
   };
   succeed(folder, run("out", "20", {}));
   succeed(folder, restarted(run("viscous", "60", {"cell_types.0.membrane_viscosity_N_s_per_m=1e-7"}), "out/checkpoint.h5"));
-  const auto& energy = report(folder / "viscous")["energy_fJ"];
-  CHECK(energy["membrane_dissipation"] > 0);
-  CHECK(report(folder / "viscous")["errors"]["area_drift"] < 0.03);
+  const auto r = report(folder / "viscous");
+  CHECK(r["energy_fJ"]["membrane_dissipation"] > 0);
+  CHECK(r["errors"]["area_drift"] < 0.01);
 }
 
 TEST_CASE("a restart refuses another geometry, and says which other keys have changed") {
