@@ -1,9 +1,6 @@
 // The slip correction: a membrane that a kernel smears out is hydrodynamically too thick.
 #pragma once
 
-#include <utility>
-
-#include "common/extremes.hpp"
 #include "fluid/masked_gradient.hpp"
 #include "transfer/marker_views.hpp"
 
@@ -161,30 +158,22 @@ inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip,
       });
 }
 
-/// The narrowest and the widest spacing along one of the grid's directions where vertices are at home here, um; 1e30 and 0 without any.
-inline std::pair<double, double> spacings_at_markers(const TransferBlock& transfer_block, const MarkerViews& markers) {
+/// Sum of the spacings along direction d where vertices are at home here, um.
+inline double sum_spacings(const TransferBlock& transfer_block, const MarkerViews& markers, int direction) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
-  double narrowest = 1e30, widest = 0;
+  const int d = direction;
+  double total = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::transfer::narrowest_spacing", Policy(0, m.count),
-      KOKKOS_LAMBDA(int marker, double& least) {
+      "corpuscle::transfer::sum_spacings", Policy(0, m.count),
+      KOKKOS_LAMBDA(int marker, double& sum) {
+        if (!m.home(marker)) return;
         Vec3 along[3];
         tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
-        for (int d = 0; d < 3; ++d)
-          if (m.home(marker)) least = smaller(least, norm(along[d]));
+        sum += norm(along[d]);
       },
-      Smallest(narrowest));
-  Kokkos::parallel_reduce(
-      "corpuscle::transfer::widest_spacing", Policy(0, m.count),
-      KOKKOS_LAMBDA(int marker, double& most) {
-        Vec3 along[3];
-        tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
-        for (int d = 0; d < 3; ++d)
-          if (m.home(marker)) most = larger(most, norm(along[d]));
-      },
-      Largest(widest));
-  return {narrowest, widest};
+      total);
+  return total;
 }
 
 /// Columns [vertex, 3], um, of the matrix that makes slip of force, times viscosity and area, of the vertices at home here; away from other

@@ -77,8 +77,13 @@ void ForceCoupling::measure_stability() {
   update_surface_geometry(surfaces());
   transfer_->place(surfaces().x);
   const Comm& comm = fluid_.grid().comm();
-  const auto [narrowest_here, widest_here] = spacings_at_markers(transfer_->block(), transfer_->views());
-  const double narrowest = comm.min(narrowest_here), widest = comm.max(widest_here);
+  // Means where the membranes are: of a tube, whose cells differ, the narrowest have too little say to be waited for.
+  const double at_home = comm.sum(static_cast<double>(transfer_->at_home()));
+  double narrowest = 1e30, widest = 0;
+  for (int d = 0; d < 3; ++d) {
+    const double spacing = comm.sum(sum_spacings(transfer_->block(), transfer_->views(), d)) / at_home;
+    narrowest = std::min(narrowest, spacing), widest = std::max(widest, spacing);
+  }
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * narrowest;
