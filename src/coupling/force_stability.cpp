@@ -135,7 +135,8 @@ double ForceCoupling::anticipated_reaction(double dt) const {
 /// a viscous membrane in a grid, for radii, viscosities and spacings of cells and steps 500 times apart). And in steps that are long
 /// beside the time in which the membrane relaxes against its own viscosity, what it springs back by comes on top: of a mode with
 /// f' = a (f + c (f - f'')) - s x, x' = x + dt m f' (Membranes::fastest_relaxation() has a and s; c is carried on) the largest stable
-/// dt times that rate is 0.15, 0.30, 0.52, 0.78, 1.2 for c = 0.9, 0.8, 0.7, 0.6, 0.45, whatever its mobility and viscosity.
+/// dt times that rate is 0.15, 0.30, 0.52, 0.78, 1.2 for c = 0.9, 0.8, 0.7, 0.6, 0.45, whatever its mobility, where its own viscosity is
+/// nearly all that resists, and more as its share falls.
 double ForceCoupling::carried_on(double dt) const {
   constexpr double least = 0.45, most = 0.9;
   const double mu = resisting_share() * fluid_.viscosity(), rho = fluid_.settings().density_pg_per_um3;

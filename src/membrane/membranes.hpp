@@ -171,8 +171,8 @@ class Membranes {
   /// @param beta     of resist(), for membranes whose viscosity slows them down, but for hold() not at all; before the first step
   double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta = 0);
 
-  /// Fastest rate at which a membrane relaxes against its own viscosity and what resist() takes for the fluid's resistance, 1/us; 0
-  /// without viscosity. As above.
+  /// Fastest rate at which a membrane relaxes against its own viscosity and what resist() takes for the fluid's resistance, times the square
+  /// of the former's share in what resists, 1/us; 0 without viscosity. As above.
   double fastest_held_relaxation_per_us(const std::vector<int>& numbers, double beta);
 
   /// Largest ratio of membrane viscosity to what the fluid answers to a wave along a membrane; 0 without cells or viscosity. As above.
