@@ -120,7 +120,7 @@ TEST_CASE("scenes of membranes as forces that cannot be are refused with what he
   refused("cell_shear", {"cells.0.dissipation=full"}, {"cells.0.dissipation", "would not turn", "\"central\""});
 }
 
-TEST_CASE("a gradient that nothing holds against is warned of, once") {
+TEST_CASE("a gradient that nothing holds against is warned of") {
   const auto folder = fresh_folder("free_fluid");
   const auto check = [&](const Words& sides) {
     const Words common{"grid.nodes=[17,17,17]", "time.step_us=5", "fluid.pressure_gradient_Pa_per_um=[-0.1,0,0]", "cells.0.push_nN=[0,0,0]",
