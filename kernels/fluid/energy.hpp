@@ -64,6 +64,21 @@ Sums<EnergyColumn::count> fluid_energy(const GridViews& grid, const ViscousCoeff
   return result;
 }
 
+/// Of the two faces of direction d of fluid cell c.
+template <int d>
+KOKKOS_INLINE_FUNCTION double face_dissipation(const VaryingViscosity& v, const Components<double>& u, const Array<NodeKind>& kind,
+                                               const IndexSpace& index, int c) {
+  const int s = index.stride(d);
+  double sum = 0;
+  for (int end = 0; end < 2; ++end) {
+    const int face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
+    if (kind(beyond) != NodeKind::fluid && kind(beyond) != NodeKind::boundary) continue;
+    const double r = face_viscosity(v, kind, c, beyond), share = kind(beyond) == NodeKind::boundary ? 1 : 0.5;
+    if (exceeds(v, r)) sum += share * dot(excess_flux<d>(v, r, u, kind, index, face), load(u, face) - load(u, face - s));
+  }
+  return sum;
+}
+
 /// What a viscosity that varies takes out of the flow beyond the uniform one, over that one's value, um3/us2: this rank's part.
 /// Faces between two nodes count half at each.
 inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& viscosity, const Array<NodeKind>& kind,
@@ -72,16 +87,8 @@ inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& 
   const IndexSpace index = grid.index;
   return sum_owned("corpuscle::fluid::excess_dissipation", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    double sum = 0;
-    if (v.least != 1 && uniform_beside_body(v, kind, index, c)) return sum;
-    for (int d = 0; d < 3; ++d)
-      for (int end = 0; end < 2; ++end) {
-        const int s = index.stride(d), face = end == 0 ? c : c + s, beyond = end == 0 ? c - s : c + s;
-        if (kind(c) != NodeKind::fluid || (kind(beyond) != NodeKind::fluid && kind(beyond) != NodeKind::boundary)) continue;
-        const double r = face_viscosity(v, kind, c, beyond), share = kind(beyond) == NodeKind::boundary ? 1 : 0.5;
-        if (exceeds(v, r)) sum += share * dot(excess_flux(v, r, u, kind, index, d, face), load(u, face) - load(u, face - s));
-      }
-    return sum;
+    if (kind(c) != NodeKind::fluid || (v.least != 1 && uniform_beside_body(v, kind, index, c))) return 0.0;
+    return face_dissipation<0>(v, u, kind, index, c) + face_dissipation<1>(v, u, kind, index, c) + face_dissipation<2>(v, u, kind, index, c);
   });
 }
 
