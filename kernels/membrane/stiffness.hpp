@@ -37,7 +37,7 @@ inline void displace(const MembraneViews& m, const StiffnessViews& w, double dis
   const auto x = m.surface.x;
   for_sections(
       "corpuscle::membrane::displace", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
-        const double factor = distance / std::sqrt(section_total(w.sums, cell, 0));
+        const double square = section_total(w.sums, cell, 0), factor = square > 0 ? distance / std::sqrt(square) : 0;
         Kokkos::parallel_for(
             section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
             [&](int i) { store(w.probe, i, load(x, i) + factor * load(w.mode, i)); });

@@ -12,8 +12,8 @@ namespace corpuscle {
 /// square of (n . g_d)^2 / h_n^2 to `coefficient`. Measured on plates at several angles, with spacings of up to 3 to 1, to 0.01 h (four-point: 0.03 h).
 /// Between fluids of viscosities mu and r mu it is their mean that resists, and less is missing, by `layered` times (r - 1)^2 / r, once
 /// the kink of the velocity is taken off (kink.hpp). That and `kink` are measured on a plane across one direction of the grid, as means over
-/// where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50. Below none, where slip_between()
-/// ends, what it lacks is left over: 0.010 h of force per area over the outer viscosity for r = 5, 0.074 h for 50, 0.048 h for 1/5, 0.42 h for 1/10.
+/// where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50, if slip_between() went on below
+/// what it ends at.
 struct SlipLaw {
   double coefficient, oblique, layered, kink;
 };
@@ -22,11 +22,15 @@ constexpr SlipLaw slip_law() {
   return Delta::points == 3 ? SlipLaw{0.104, 0.28, 0.0415, 0.237} : SlipLaw{0.38, 0.22, 0.0206, 0.358};
 }
 
-/// Slip between two fluids over that in one as viscous as the outer one. Never less than none: the membrane would be driven by what
-/// it is to resist.
+/// Slip between two fluids over that in one as viscous as the outer one. What is as short as the kernel's width hardly moves a vertex but by
+/// slip: where none is left, a membrane that resists being strained (by its viscosity, above all) holds the fluid of all that width at rest.
+/// The viscosity that a sphere so held adds, three spacings in radius, jumps from 6 to 30 % too much where slip ends (ratio 4.27). Hence not
+/// less than `least`, by which a plane is too mobile (0.03 h of force per area over the outer viscosity for r = 5): 5 %, and none with five
+/// spacings; blood in a slit, with ratio 5 and 1e-7 N s/m, on 0.5 um, 3 % beyond ratio 1 for 7 %.
 KOKKOS_INLINE_FUNCTION double slip_between(const SlipLaw& law, double ratio) {
-  const double left = 1 - law.layered / law.coefficient * (ratio - 1) * (ratio - 1) / ratio;
-  return left > 0 ? 2 * left / (1 + ratio) : 0;
+  constexpr double least = 0.2;
+  const double slip = 2 * (1 - law.layered / law.coefficient * (ratio - 1) * (ratio - 1) / ratio) / (1 + ratio);
+  return slip > least ? slip : least;
 }
 
 /// What the velocity of a membrane between two fluids takes along of the mean shear there, over spacings; see kink.hpp.
@@ -132,7 +136,6 @@ inline void limit_slip(int vertices, double most, const Array<double>& stiffenin
 KOKKOS_INLINE_FUNCTION Vec3 slip_velocity(const TransferBlock& block, const SlipViews& slip, const MarkerViews& m, int marker) {
   const int v = m.vertex(marker);
   const double between = slip_between(slip.law, slip.ratio_of(v));
-  if (between == 0) return {};
   const MarkerPlace place(block.lattice, m, marker);
   const double(&eta)[3] = place.eta;
   Vec3 along[3];
@@ -158,22 +161,18 @@ inline void add_slip(const TransferBlock& transfer_block, const SlipViews& slip,
       });
 }
 
-/// Sum of the spacings along direction d where vertices are at home here, um.
-inline double sum_spacings(const TransferBlock& transfer_block, const MarkerViews& markers, int direction) {
+/// The grid's spacings [vertex, 3] along its directions, um, where vertices are at home here.
+inline void spacings_at(const TransferBlock& transfer_block, const MarkerViews& markers, const Components<double>& spacings) {
   const TransferBlock block = transfer_block;
   const MarkerViews m = markers;
-  const int d = direction;
-  double total = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::transfer::sum_spacings", Policy(0, m.count),
-      KOKKOS_LAMBDA(int marker, double& sum) {
+  const Components<double> out = spacings;
+  Kokkos::parallel_for(
+      "corpuscle::transfer::spacings_at", Policy(0, m.count), KOKKOS_LAMBDA(int marker) {
         if (!m.home(marker)) return;
         Vec3 along[3];
         tangents_at(block, MarkerPlace(block.lattice, m, marker).eta, along);
-        sum += norm(along[d]);
-      },
-      total);
-  return total;
+        store(out, m.vertex(marker), Vec3{norm(along[0]), norm(along[1]), norm(along[2])});
+      });
 }
 
 /// Columns [vertex, 3], um, of the matrix that makes slip of force, times viscosity and area, of the vertices at home here; away from other

@@ -187,9 +187,9 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   packed.reset();
   print_packing(simulation);
   print_schedule(simulation.schedule());
-  print_coupling(simulation);
   std::vector<std::string> changed;
   const auto totals = restart(scene, options.restart, place, simulation, changed);
+  print_coupling(simulation);  // of packed cells as they have grown
   place.begin();
   Ending ending{exit_done, start_report(comm, scene)};
   Report& report = ending.report;

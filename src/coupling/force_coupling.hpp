@@ -64,6 +64,7 @@ class ForceCoupling : public Coupling {
   std::array<double, 5> load_beside(int body) const;
   double loss_beside_bodies() const;
   void warn_of_image() const;
+  void warn_of_ratios() const;
   void warn_of_walls() const;
   void warn_of_pressed_start() const;
   void inflate();
@@ -104,6 +105,8 @@ class ForceCoupling : public Coupling {
   void look(double time_us, double dt_us);
   void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
+  double second_order_share() const;
+  std::pair<double, double> spacings_of_cells();
   void measure_stability();
   void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers);
   void refuse_long_steps() const;
@@ -119,7 +122,8 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<SharpCoupling> bodies_;  // rigid ones, and the flow around them; null without any
   std::optional<PackingReport> packing_;  // only with populations
   std::optional<PackedShare> packed_;
-  double packed_gap_ = 0;                 // um, the least of the populations'
+  double asked_gap_ = 0;                  // um, the least of the populations'
+  double packed_gap_ = 0;                 // um, that which they must have
   bool packed_in_box_ = false;            // some are to start within one
   int packed_listed_ = 0;                 // cells of the scene that are not packed
   double small_stable_us_ = 0;            // stable_us_, short_waves_ and held_rate_ of packed cells before they have grown

@@ -34,6 +34,7 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
     packed_gap_ = std::min(packed_gap_, population.gap_um);
     packed_in_box_ = packed_in_box_ || population.lower_um || population.upper_um;
   }
+  asked_gap_ = packed_gap_;
   if (places.size == 1) return;
   small_ = packed != nullptr;
   grows_ = packed == nullptr;
@@ -83,9 +84,9 @@ void ForceCoupling::set_state(const std::vector<double>& state) {
   small_stable_us_ = stable_us_;
   stable_us_ = of_grown(small_stable_us_, state.at(3), state.at(0));
   small_short_waves_ = short_waves_;
-  if (short_waves_ > 0 && state.size() > 5 && state[5] > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
+  if (short_waves_ > 0 && state.at(5) > 0) short_waves_ = of_grown(small_short_waves_, state.at(5), state.at(4));
   small_held_rate_ = held_rate_;
-  if (held_rate_ > 0 && state.size() > 7 && state[7] > 0) held_rate_ = of_grown(small_held_rate_, state.at(7), state.at(6));
+  if (held_rate_ > 0 && state.at(7) > 0) held_rate_ = of_grown(small_held_rate_, state.at(7), state.at(6));
   membranes_->take_share_of_resistance(short_waves_);
   if (state.at(1) > 0) {
     softest_.area = state.at(1);
@@ -104,7 +105,7 @@ void ForceCoupling::check_packing() {
   constexpr double rounded = 0.01;  // um, of sides between nodes
   const Comm& comm = fluid_.grid().comm();
   ContactSettings settings;
-  settings.range_um = packed_gap_ + reach;
+  settings.range_um = asked_gap_ + reach;
   const ContactPeers peers{comm, [this] { cells_->to_copies(surfaces().x, true); }};
   Contact contact(settings, surfaces(), Images{}, fluid_.viscosity(), 0, &peers);
   contact.take_up(surfaces(), membranes_->templates());
@@ -116,7 +117,12 @@ void ForceCoupling::check_packing() {
   const double to_side =
       sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);
-  if (packing_->smallest_gap_um >= packed_gap_ && packing_->smallest_wall_gap_um >= packed_gap_ - rounded) return;
+  const double least = std::min(packing_->smallest_gap_um, packing_->smallest_wall_gap_um + rounded);
+  if (least >= packed_gap_ && least < asked_gap_)
+    warn("populations: gap_um = {:g} is asked for, and cells that have grown as membranes keep what contact leaves them: the nearest are {} from "
+         "each other and {} from a wall. Ask for fewer cells (hematocrit, count), or for a smaller gap_um",
+         asked_gap_, gap_text(packing_->smallest_gap_um, settings.range_um), gap_text(packing_->smallest_wall_gap_um, settings.range_um));
+  if (least >= packed_gap_) return;
   throw InputError(fmt::format("populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "
                                "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
                                gap_text(packing_->smallest_gap_um, settings.range_um),

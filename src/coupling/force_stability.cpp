@@ -37,14 +37,15 @@ void ForceCoupling::refuse_long_steps() const {
                     scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 
-/// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on (spheres and red cells, 0.4 to
-/// 1.2 spacings an edge: sound up to 0.64, growing from 0.73).
-constexpr double second_order_share = 0.6;
+/// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on. With slip spheres and red cells of
+/// 0.4 to 1.2 spacings an edge are sound up to 0.64 and grow from 0.73; without it, where the estimate of short waves has less to spare, they
+/// are sound up to 0.50 and grow from 0.54 to 0.59.
+double ForceCoupling::second_order_share() const { return scene_.coupling->slip ? 0.6 : 0.45; }
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
 /// mean of the velocities at both ends: second order. Longer steps than two thirds of the largest stable one would swing then: those are
 /// Euler's.
-bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share * stable_us_; }
+bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share() * stable_us_; }
 
 /// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the
 /// outer one, which is all that resists the slip. Without slip, whose dipoles stand for it, the harmonic one: of a thinner fluid inside a
@@ -67,23 +68,40 @@ void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std
   membranes_->take_share_of_resistance(short_waves_);
 }
 
+/// The least and the largest of what the grid's spacings along a direction, um, are over a cell's vertices in the mean: the narrowest spacings
+/// that a cell of a tube reaches have too little say to be waited for, but where all of them are narrow, as inside a bend, that cell is.
+std::pair<double, double> ForceCoupling::spacings_of_cells() {
+  const Components<double> spacings("corpuscle::coupling::spacings", surfaces().vertices, 3);
+  spacings_at(transfer_->block(), transfer_->views(), spacings);
+  cells_->add_copies(spacings);
+  const auto at = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), spacings);
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces().first_vertex);
+  double narrowest = 1e30, widest = 0;
+  for (int c = 0; first(c) < surfaces().own_vertices; ++c)
+    for (int d = 0; d < 3; ++d) {
+      double sum = 0;
+      for (int v = first(c); v < first(c + 1); ++v) sum += at(v, d);
+      const double mean = sum / (first(c + 1) - first(c));
+      narrowest = std::min(narrowest, mean), widest = std::max(widest, mean);
+    }
+  const Comm& comm = fluid_.grid().comm();
+  return {comm.min(narrowest), comm.max(widest)};
+}
+
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
 /// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
 /// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
-/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two.
+/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane viscosity
+/// lets steps be up to 1500 times as long, as far as plane waves go; spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
+/// which bending, that it does not resist, and stretching act together, were sound at 0.15 of that and some grew at 0.3: a fifth of it
+/// counts, where that is more than what they stand without.
 void ForceCoupling::measure_stability() {
-  constexpr double limit = 1.5, of_dipoles = 2;
+  constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 5;
   update_surface_geometry(surfaces());
   transfer_->place(surfaces().x);
   const Comm& comm = fluid_.grid().comm();
-  // Means where the membranes are: of a tube, whose cells differ, the narrowest have too little say to be waited for.
-  const double at_home = comm.sum(static_cast<double>(transfer_->at_home()));
-  double narrowest = 1e30, widest = 0;
-  for (int d = 0; d < 3; ++d) {
-    const double spacing = comm.sum(sum_spacings(transfer_->block(), transfer_->views(), d)) / at_home;
-    narrowest = std::min(narrowest, spacing), widest = std::max(widest, spacing);
-  }
+  const auto [narrowest, widest] = spacings_of_cells();
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * narrowest;
@@ -101,9 +119,11 @@ void ForceCoupling::measure_stability() {
   const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
   anticipate_short_waves(model, numbers);
   held_rate_ = comm.max(membranes_->fastest_held_relaxation_per_us(numbers, beta));
-  const double fastest =
-      std::max(membranes_->fastest_relaxation_per_us(model, numbers, beta), loads_ ? loads_->fastest_relaxation_per_us() : 0);
-  stable_us_ = limit / comm.max(fastest);
+  double fastest = comm.max(membranes_->fastest_relaxation_per_us(model, numbers));
+  if (membranes_->viscosity())
+    fastest = std::min(fastest, of_viscous * comm.max(membranes_->fastest_relaxation_per_us(model, numbers, beta)));
+  if (loads_) fastest = std::max(fastest, comm.max(loads_->fastest_relaxation_per_us()));
+  stable_us_ = limit / fastest;
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
@@ -168,7 +188,7 @@ void ForceCoupling::find_softest() {
 
 /// Slip is stiff: all that grows with the stiffness is left to the grid's velocity once a step could no longer follow.
 void ForceCoupling::limit_slip(double dt) {
-  const double most = (second_order(dt) ? second_order_share : 1.0) * stable_us_ / dt;
+  const double most = (second_order(dt) ? second_order_share() : 1.0) * stable_us_ / dt;
   const Array<double> share(followed_.data(), followed_.extent(0));
   membranes_->measure_stiffening(share);
   corpuscle::limit_slip(membranes_->vertices(), most, share);

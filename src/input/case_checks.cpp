@@ -87,7 +87,7 @@ void check_dissipation(const Case& scene, const Complaint& complain) {
       complain(section, "dissipation", "\"full\" resists turning as well as straining, and a free cell would not turn with the fluid that its "
                "membrane is part of in coupling.scheme = \"force\": use \"central\", or leave it out");
   };
-  for (std::size_t c = 0; c < scene.cells.size(); ++c) check(fmt::format("cells.{}", c), scene.cells[c]);
+  for (std::size_t c = 0; c < scene.cells.size(); ++c) check(constants_entry(scene, c), scene.cells[c]);
   for (std::size_t t = 0; t < scene.cell_types.size(); ++t) check(fmt::format("cell_types.{}", t), scene.cell_types[t].cell);
 }
 
@@ -218,6 +218,10 @@ void check_sampling(const Case& scene, const Complaint& complain) {
   if (scene.blood && !(scene.blood->from_us < scene.time.end_us))
     complain("blood", "from_us",
              fmt::format("sampling would begin at {:g} us, and the run ends at {:g} us (time.end_us): begin earlier, or run longer",
+                         scene.blood->from_us, scene.time.end_us));
+  else if (scene.blood && scene.blood->sample_every_us > scene.time.end_us - scene.blood->from_us)
+    complain("blood", "sample_every_us",
+             fmt::format("no sample would fall between blood.from_us = {:g} us and time.end_us = {:g} us: sample more often, or run longer",
                          scene.blood->from_us, scene.time.end_us));
 }
 

@@ -12,7 +12,7 @@
 namespace corpuscle {
 
 struct CheckpointHeader {
-  static constexpr int format_version = 4;
+  static constexpr int format_version = 5;
 
   std::string git;             // hash of the program that wrote it; filled in by the writer
   std::string resolved;        // the case, every key with the value used

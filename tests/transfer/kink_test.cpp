@@ -13,7 +13,6 @@ using namespace corpuscle::transfer_test;
 
 namespace {
 
-/// So viscous that a slip would drive the membrane: there is none, and what is left is the kink.
 constexpr double ratio = 50;
 
 /// Points with a normal, of one type.
@@ -32,14 +31,16 @@ struct Points {
     set.vertex_body = Array<int>("corpuscle::test::body", count);
     Kokkos::deep_copy(set.area, 0.01);
   }
-  SlipViews slip(const Transfer& transfer) const { return transfer.slip(set, force, 1, type, gap); }
+  SlipViews slip(const Transfer& transfer) const { return transfer.slip(set, force, viscosity, type, gap); }
 
   SurfaceSet set;
   Components<double> force;
   Array<int> type;
   Array<double> gap;  // um, if any
+  double viscosity = 1;
 };
 
+/// In a fluid so viscous that none slips: what is left is the kink.
 /// @param shifts  of the images of each
 Points random_points(int count, double edge, bool warped, const std::vector<Vec3>& shifts = {Vec3{}}) {
   Noise noise;
@@ -52,7 +53,9 @@ Points random_points(int count, double edge, bool warped, const std::vector<Vec3
     const Vec3 x = load(one, i % count) + shifts[i / count];
     return Triple{x.x, x.y, x.z};
   };
-  return Points(points(all, at), points(all, [&](int i) { return force[i % count]; }), [&](int i) { return normal[i % count]; });
+  Points p(points(all, at), points(all, [&](int i) { return force[i % count]; }), [&](int i) { return normal[i % count]; });
+  p.viscosity = 1e30;
+  return p;
 }
 
 Components<double> velocity_of(Transfer& transfer, const Field& field, const Points& p, bool with) {
@@ -262,7 +265,7 @@ TEST_CASE("a plane between two fluids moves as it should, sheared or pulled", "[
     WARN(fmt::format("r {}: sheared {:.3f}, {:.3f} without; pulled {:.3f}, {:.3f} without", r, with, without, pulled, pulled_before));
   CHECK(without > 0.2);
   CHECK(std::abs(with) < 0.01);
-  CHECK(std::abs(pulled) < 0.04);  // there is no slip below none, for r = 5
+  CHECK(std::abs(pulled) < (r == 5 ? 0.1 : 0.04));  // 0.03 times its mean viscosity for r = 5, whose slip is the least
   if (r == 5) CHECK(pulled_before > 0.15);
 }
 
@@ -281,7 +284,7 @@ TEST_CASE("beside a wall a plane between two fluids moves as well as it does ami
                        r, gap, with, without, far, pulled_with, pulled_without, pulled_far, free_with, free_without, free_far));
     CHECK(std::abs(with) < 0.04);  // 0.034 at most, of which as much far away
     if (gap > 0.6) CHECK(without > 0.08);
-    CHECK(std::abs(pulled_with) < (gap < 0.5 ? 0.28 : 0.18));  // 0.48 without
+    CHECK(std::abs(pulled_with) < (gap < 0.5 ? 0.28 : 0.21));  // 0.48 without
     if (gap > 1) {
       CHECK(without > 0.2);
       CHECK(std::abs(with - far) < 0.012);
