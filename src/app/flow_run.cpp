@@ -59,7 +59,7 @@ void print_coupling(FlowSimulation& simulation) {
   if (!simulation.membranes()) return;
   const double dt = simulation.next_step_us();
   const auto estimate = simulation.coupling()->stability(dt);
-  if (!estimate) return info("{}", simulation.coupling()->stability_text(dt));
+  if (!estimate) return;
   const StabilityEstimate& s = *estimate;
   info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
        s.mass_term, s.beta, s.threshold(), s.margin());
@@ -67,6 +67,13 @@ void print_coupling(FlowSimulation& simulation) {
   if (substeps > 1)
     info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
          simulation.membranes()->stable_step_us());
+}
+
+/// Of membranes that are forces; after a restart, of packed cells as they have grown.
+void print_stability(FlowSimulation& simulation) {
+  if (!simulation.membranes()) return;
+  const std::string text = simulation.coupling()->stability_text(simulation.next_step_us());
+  if (!text.empty()) info("{}", text);
 }
 
 /// Cells of populations that a checkpoint has; null where they are to be packed.
@@ -187,9 +194,10 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   packed.reset();
   print_packing(simulation);
   print_schedule(simulation.schedule());
+  print_coupling(simulation);
   std::vector<std::string> changed;
   const auto totals = restart(scene, options.restart, place, simulation, changed);
-  print_coupling(simulation);  // of packed cells as they have grown
+  print_stability(simulation);
   place.begin();
   Ending ending{exit_done, start_report(comm, scene)};
   Report& report = ending.report;

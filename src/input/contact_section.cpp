@@ -9,9 +9,10 @@ namespace corpuscle {
 
 ContactSettings read_contact(Section& s) {
   constexpr double least_um = 0.01, most_contact_um = 2, most_fJ_per_um2 = 10;
+  constexpr double least_Pa = 0.01, most_Pa = 1e6;  // the least: what plasma shears with at 10 /s
   ContactSettings c;
   c.range_um = s.number("range_um", between(least_um, most_contact_um), c.range_um);
-  c.pressure = s.number("pressure_Pa", positive(1e6), c.pressure / units::Pa) * units::Pa;
+  c.pressure = s.number("pressure_Pa", between(least_Pa, most_Pa), c.pressure / units::Pa) * units::Pa;
   c.aggregation_energy = s.number("aggregation_energy_fJ_per_um2", between(0, most_fJ_per_um2), c.aggregation_energy);
   const std::string reach = "aggregation_range_um";
   if (c.aggregation_energy > 0) {

@@ -179,6 +179,7 @@ TEST_CASE("a cell that is alone but near its own image is warned of as two cells
   };
   CHECK_THAT(scene_of(8.2), Contains("cells.0 is 0.41") && Contains("um from its own image") && Contains("add [contact]"));
   CHECK_THAT(scene_of(12), !Contains("own image"));
+  CHECK_THAT(start(folder, with({"check", "alone.toml"}, {"grid.lower_um=[-6,-6,-6]", "grid.upper_um=[6,6,6]", "output.fields=[\"wall_shear_stress\"]"})).output, Contains("output.fields") && Contains("no side is a wall"));
 }
 
 TEST_CASE("membrane viscosity that drives instead of resisting is told") {
@@ -192,4 +193,22 @@ TEST_CASE("membrane viscosity that drives instead of resisting is told") {
   CHECK(driven["errors"]["membrane_drive"] > 0.1);
   const auto names = figures_of(driven["warnings"]);
   CHECK(std::count(names.begin(), names.end(), "membrane_drive") == 1);
+}
+
+TEST_CASE("what a grid does not resolve of two fluids, a gap that growing cells do not keep, and samples that no run has are told") {
+  const auto folder = fresh_folder("told_at_start");
+  const auto checked = [&](const std::string& name, const std::vector<std::string>& settings) {
+    return start(folder, with({"check", scene(name)}, settings)).output;
+  };
+  const std::vector<std::string> coarse = {"grid.nodes=[17,17,17]", "cells.0.vertices=300"};
+  const auto capsule = [&](const std::string& ratio) {
+    return checked("capsule_shear", {coarse[0], coarse[1], "cells.0.viscosity_ratio=" + ratio});
+  };
+  CHECK_THAT(capsule("0.4"), Contains("viscosity_ratio = 0.4") && Contains("less than half as viscous"));
+  CHECK_THAT(capsule("11"), Contains("viscosity_ratio = 11") && Contains("more than ten times"));
+  CHECK_THAT(capsule("5"), !Contains("resist the flow too much"));
+  const std::vector<std::string> file = {"grid.nodes=[15,15,33]", "grid.length_um=14", "cell_types.0.vertices=300"};
+  const auto single = [&](const std::string& more) { return checked("single_file", {file[0], file[1], file[2], more}); };
+  CHECK_THAT(single("populations.0.gap_um=1"), Contains("gap_um = 1 is asked for") && Contains("keep what contact leaves them"));
+  CHECK_THAT(single("blood.sample_every_us=1e9"), Contains("blood.sample_every_us") && Contains("no sample would fall"));
 }

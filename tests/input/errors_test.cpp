@@ -280,7 +280,7 @@ TEST_CASE("cells and bodies are checked") {
   const auto contact = [&](const std::string& key) { return cell("[coupling]\nscheme = \"force\"\n[contact]\n" + key); };
   REQUIRE(contact("range_um = 0.3\naggregation_energy_fJ_per_um2 = 1e-3\naggregation_range_um = 0.5") == "accepted");
   require_parts(contact("range_um = 0"), {":15: contact.range_um = 0", "from 0.01 to 2"});
-  require_parts(contact("pressure_Pa = -1"), {":15: contact.pressure_Pa = -1", "above 0"});
+  require_parts(contact("pressure_Pa = -1"), {":15: contact.pressure_Pa = -1", "from 0.01 to"});
   require_parts(contact("aggregation_range_um = 0.5"), {":15: contact.aggregation_range_um", "only with aggregation_energy_fJ_per_um2"});
   require_parts(contact("aggregation_energy_fJ_per_um2 = 1e-3\naggregation_range_um = 0.2"),
                 {":16: contact.aggregation_range_um", "1.2 times range_um"});
@@ -294,6 +294,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(blood("sample_every_us = 0"), {":15: blood.sample_every_us = 0", "above 0"});
   require_parts(blood("layer_window_um = 0"), {":15: blood.layer_window_um = 0", "from 0.1"});
   require_parts(blood("from_us = 1e9"), {":15: blood.from_us", "time.end_us", "begin earlier"});
+  require_parts(blood("sample_every_us = 1e9"), {":15: blood.sample_every_us", "no sample would fall"});
   require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});
   require_parts(message(flow + "\n[output]\nfields = [\"wall_stress\"]\n"), {"output.fields", "\"wall_shear_stress\""});
   require_parts(cell("[output]\ncells_in_history = -1"), {":13: output.cells_in_history = -1", "from 0"});

@@ -280,7 +280,7 @@ TEST_CASE("broken and foreign checkpoints are refused by name and fault") {
     file.attribute("/", "format", "Corpuscle checkpoint");
     file.attribute("/", "version", std::int64_t{1});
   }
-  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 4") && Contains("another version of the program"));
+  REQUIRE_THAT(read_error(bad), Contains("format version 1") && Contains("reads version 5") && Contains("another version of the program"));
   {
     auto file = Hdf5File::create(bad.string());
     file.attribute("/", "format", "Corpuscle checkpoint");
