@@ -213,6 +213,9 @@ void check_modules(const Case& scene, const Complaint& complain) {
                                    "this section out");
   check_populations(scene, complain);
   check_boundaries(scene, complain);
+}
+
+void check_output(const Case& scene, const Complaint& complain) {
   const auto is_wall = [](const BoundarySettings& b) { return b.type == Type::wall || b.type == Type::moving_wall; };
   if (scene.output.wall_shear_stress && std::none_of(scene.boundaries.begin(), scene.boundaries.end(), is_wall))
     complain("output", "fields", "no side is a wall, so there is no \"wall_shear_stress\": leave it out");

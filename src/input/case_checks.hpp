@@ -20,6 +20,9 @@ void check_modules(const Case& scene, const Complaint& complain);
 /// After [time]: whether anything is sampled at all.
 void check_sampling(const Case& scene, const Complaint& complain);
 
+/// Once [output] is read.
+void check_output(const Case& scene, const Complaint& complain);
+
 const char* name_of(BoundarySettings::Side side);
 
 }  // namespace corpuscle

@@ -60,6 +60,7 @@ class CaseReader {
     check_sampling(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     const bool has_fluid = scene.fluid.has_value(), has_surfaces = scene.has_cells() || !scene.bodies.empty();
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
+    check_output(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     note_often_history(scene);
     note_sharp_aggregation(scene);
     scene.resolved = echo_;
