@@ -182,8 +182,8 @@ void ForceCoupling::check_start() {
   find_softest();
   measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
-  if (small_) return membranes_->rest_at_size(1);
   warn_of_ratios();
+  if (small_) return membranes_->rest_at_size(1);
   warn_of_walls();
   warn_of_pressed_start();
   refuse_long_steps();

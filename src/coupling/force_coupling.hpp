@@ -106,7 +106,11 @@ class ForceCoupling : public Coupling {
   void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
   double second_order_share() const;
-  std::pair<double, double> spacings_of_cells();
+  struct Spacings {
+    double narrowest = 1e30, widest = 0;  // um
+    std::vector<int> numbers;             // of the cells that stand for their types
+  };
+  Spacings spacings_of_cells();
   void measure_stability();
   void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers);
   void refuse_long_steps() const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.hpp"
 #include "coupling/force_coupling.hpp"
@@ -68,24 +69,45 @@ void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std
   membranes_->take_share_of_resistance(short_waves_);
 }
 
-/// The least and the largest of what the grid's spacings along a direction, um, are over a cell's vertices in the mean: the narrowest spacings
-/// that a cell of a tube reaches have too little say to be waited for, but where all of them are narrow, as inside a bend, that cell is.
-std::pair<double, double> ForceCoupling::spacings_of_cells() {
+/// Of a cell the grid's spacings count as what they are over its vertices in the mean: the narrowest that a cell of a tube reaches have too little
+/// say to be waited for, but where all of them are narrow, as inside a bend, that cell is. Slip grows with the spacing: of each type the first
+/// cell, that in the narrowest and that in the widest spacings stand for all, the same ones on any number of ranks.
+ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
+  constexpr double rounding = 1e-9, none = std::numeric_limits<int>::max();
   const Components<double> spacings("corpuscle::coupling::spacings", surfaces().vertices, 3);
   spacings_at(transfer_->block(), transfer_->views(), spacings);
   cells_->add_copies(spacings);
   const auto at = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), spacings);
   const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), surfaces().first_vertex);
-  double narrowest = 1e30, widest = 0;
-  for (int c = 0; first(c) < surfaces().own_vertices; ++c)
+  const auto& own = cells_->own();
+  std::vector<std::pair<double, double>> of_cell(own.size(), {1e30, 0});  // the least and the largest mean
+  for (std::size_t c = 0; c < own.size(); ++c)
     for (int d = 0; d < 3; ++d) {
       double sum = 0;
       for (int v = first(c); v < first(c + 1); ++v) sum += at(v, d);
       const double mean = sum / (first(c + 1) - first(c));
-      narrowest = std::min(narrowest, mean), widest = std::max(widest, mean);
+      of_cell[c] = {std::min(of_cell[c].first, mean), std::max(of_cell[c].second, mean)};
     }
   const Comm& comm = fluid_.grid().comm();
-  return {comm.min(narrowest), comm.max(widest)};
+  Spacings result;
+  for (std::size_t t = 0; t < membranes_->types().size(); ++t) {
+    double narrowest = 1e30, widest = 0;
+    for (std::size_t c = 0; c < own.size(); ++c)
+      if (own[c].type == static_cast<int>(t)) narrowest = std::min(narrowest, of_cell[c].first), widest = std::max(widest, of_cell[c].second);
+    narrowest = comm.min(narrowest), widest = comm.max(widest);
+    result.narrowest = std::min(result.narrowest, narrowest), result.widest = std::max(result.widest, widest);
+    double number[3] = {none, none, none};
+    for (std::size_t c = 0; c < own.size(); ++c) {
+      if (own[c].type != static_cast<int>(t)) continue;
+      const bool stands[3] = {true, of_cell[c].first <= narrowest * (1 + rounding), of_cell[c].second >= widest * (1 - rounding)};
+      for (int n = 0; n < 3; ++n)
+        if (stands[n]) number[n] = std::min(number[n], static_cast<double>(own[c].number));
+    }
+    for (double& n : number)
+      if ((n = comm.min(n)) < none && std::find(result.numbers.begin(), result.numbers.end(), static_cast<int>(n)) == result.numbers.end())
+        result.numbers.push_back(static_cast<int>(n));
+  }
+  return result;
 }
 
 /// Forward Euler in a fluid whose viscosity alone resists: stable while dt times the fastest rate of relaxation is below two.
@@ -93,15 +115,15 @@ std::pair<double, double> ForceCoupling::spacings_of_cells() {
 /// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
 /// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
 /// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane viscosity
-/// lets steps be up to 1500 times as long, as far as plane waves go; spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
-/// which bending, that it does not resist, and stretching act together, were sound at 0.15 of that and some grew at 0.3: a fifth of it
-/// counts, where that is more than what they stand without.
+/// lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
+/// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.03 of that and some grew from 0.06 on: a
+/// fiftieth of it counts, where that is more than what they stand without.
 void ForceCoupling::measure_stability() {
-  constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 5;
+  constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 50;
   update_surface_geometry(surfaces());
   transfer_->place(surfaces().x);
   const Comm& comm = fluid_.grid().comm();
-  const auto [narrowest, widest] = spacings_of_cells();
+  const auto [narrowest, widest, numbers] = spacings_of_cells();
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * narrowest;
@@ -112,9 +134,6 @@ void ForceCoupling::measure_stability() {
     model.dipole = of_dipoles * transfer_->largest_dipole() * resisting_share() * widest;
     model.width = 0.8 * narrowest;
   }
-  // Of each type the same cell on any number of ranks: what slip is held to goes by this.
-  std::vector<int> numbers = membranes_->first_of_types();
-  for (int& number : numbers) number = static_cast<int>(comm.min(number));
   // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
   const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
   anticipate_short_waves(model, numbers);

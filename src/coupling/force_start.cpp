@@ -48,9 +48,11 @@ void ForceCoupling::warn_of_walls() const {
 /// Fluids as different as these, side by side in few spacings, are not resolved as well as others.
 void ForceCoupling::warn_of_ratios() const {
   constexpr double least = 0.35, most = 10;  // a sphere of three spacings, held: 14 and 13 % too much
+  std::vector<double> told;  // once, of however many types
   for (const CellReference& type : membranes_->types()) {
     const double ratio = type.viscosity_ratio;
-    if (ratio >= least && ratio <= most) continue;
+    if ((ratio >= least && ratio <= most) || std::find(told.begin(), told.end(), ratio) != told.end()) continue;
+    told.push_back(ratio);
     warn("viscosity_ratio = {:g}: cells that hardly deform resist the flow too much around a fluid that is {}: a sphere of three spacings of the "
          "grid a radius adds {} too much to the viscosity, one of five {}; compare with a finer grid (grid.nodes)",
          ratio, ratio < least ? "a third as viscous as that outside or less" : "more than ten times as viscous",

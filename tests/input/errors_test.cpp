@@ -294,7 +294,9 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(blood("sample_every_us = 0"), {":15: blood.sample_every_us = 0", "above 0"});
   require_parts(blood("layer_window_um = 0"), {":15: blood.layer_window_um = 0", "from 0.1"});
   require_parts(blood("from_us = 1e9"), {":15: blood.from_us", "time.end_us", "begin earlier"});
-  require_parts(blood("sample_every_us = 1e9"), {":15: blood.sample_every_us", "no sample would fall"});
+  require_parts(blood("sample_every_us = 1e9"), {":15: blood.sample_every_us", "no sample, of those"});
+  require_parts(blood("from_us = 9\nsample_every_us = 4"), {":16: blood.sample_every_us", "no sample"});
+  REQUIRE(blood("from_us = 7\nsample_every_us = 4") == "accepted");  // at 8 us
   require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});
   require_parts(message(flow + "\n[output]\nfields = [\"wall_stress\"]\n"), {"output.fields", "\"wall_shear_stress\""});
   require_parts(cell("[output]\ncells_in_history = -1"), {":13: output.cells_in_history = -1", "from 0"});
