@@ -102,7 +102,7 @@ TEST_CASE("a mesh with triangles much smaller than what reference gives them to 
     const std::string built_in = "vertices = 500";
     text.replace(text.find(built_in), built_in.size(), "mesh = \"graded.off\"\nreference = \"" + reference + "\"");
     std::ofstream(folder / "graded.toml") << text;
-    return succeed(folder, {"check", "graded.toml"}).output;
+    return succeed(folder, {"check", "graded.toml", "--set", "time.step_us=10"}).output;
   };
   CHECK_THAT(start("uniform"), Contains("start squeezed") && Contains("reference = \"shape\""));
   CHECK_THAT(start("shape"), !Contains("start squeezed"));
