@@ -116,7 +116,7 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
 /// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
 /// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane viscosity
 /// lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
-/// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.03 of that and some grew from 0.06 on: a
+/// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.02 of that and one grew slowly at 0.03: a
 /// fiftieth of it counts, where that is more than what they stand without.
 void ForceCoupling::measure_stability() {
   constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 50;
