@@ -44,8 +44,8 @@ void ForceCoupling::refuse_long_steps() const {
 double ForceCoupling::second_order_share() const { return scene_.coupling->slip ? 0.6 : 0.45; }
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
-/// mean of the velocities at both ends: second order. Longer steps than two thirds of the largest stable one would swing then: those are
-/// Euler's.
+/// mean of the velocities at both ends: second order. Longer steps, beyond second_order_share() of the largest stable
+/// one, would swing then: those are Euler's.
 bool ForceCoupling::second_order(double dt) const { return dt <= second_order_share() * stable_us_; }
 
 /// The viscosity that resists a membrane, over that outside: the mean of both sides' for waves along it, and never more than the

@@ -260,13 +260,6 @@ void Membranes::limit_volume(double share) {
     views_.most_volume = std::max(views_.most_volume, farther * std::abs(volume(type.mesh) / type.law.rest_volume - 1));
 }
 
-std::vector<int> Membranes::first_of_types() const {
-  const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
-  std::vector<int> first(types_.size(), no_cell);
-  for (int c = 0; c < views_.cells; ++c) first[type(c)] = std::min(first[type(c)], number(c));
-  return first;
-}
-
 std::vector<int> Membranes::cells_of(const std::vector<int>& numbers) const {
   std::vector<int> cells;
   for (int c = 0; c < views_.cells; ++c)

@@ -161,10 +161,6 @@ class Membranes {
   double volume_taken();
   void give_volume_back();
 
-  /// [type] the number of its first cell here; no_cell without one.
-  std::vector<int> first_of_types() const;
-  static constexpr int no_cell = std::numeric_limits<int>::max();
-
   /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over those cells, 1/us; 0 without any.
   /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
   /// @param numbers  of the cells that stand for their types; those that other ranks have are passed over

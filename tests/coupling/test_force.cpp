@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <numeric>
 
 #include "core/error.hpp"
 #include "capsule.hpp"
@@ -281,7 +282,9 @@ TEST_CASE("the fastest relaxation is that of the stiffest of several laws", "[co
     }
     Membranes membranes(cells);
     update_surface_geometry(membranes.surfaces());
-    return membranes.fastest_relaxation_per_us(model, membranes.first_of_types());
+    std::vector<int> all(cells.size());
+    std::iota(all.begin(), all.end(), 0);
+    return membranes.fastest_relaxation_per_us(model, all);
   };
   const double springs = fastest({Law::wlc_pow}), skalak = fastest({Law::skalak}), neo_hookean = fastest({Law::neo_hookean});
   CHECK(springs != Approx(skalak).epsilon(0.05));
@@ -337,7 +340,7 @@ TEST_CASE("what a membrane that hardly deforms takes from a flow hardly depends 
   const double plasma = flow({}), one = plasma / flow(1) - 1, four = plasma / flow(4) - 1, five = plasma / flow(5) - 1, twenty = plasma / flow(20) - 1;
   if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("added: {:.5f}; {:.3f}, {:.3f}, {:.3f} times that", one, four / one, five / one, twenty / one));
   CHECK(one > 0.01);
-  CHECK(four / one == Approx(1).margin(0.1));
+  CHECK(four / one == Approx(1).margin(0.1));  // 1.075, 1.092
   CHECK(five / one == Approx(1).margin(0.12));
   CHECK(twenty / one < 1.5);  // what the least slip leaves
 }
