@@ -4,7 +4,7 @@
 #   ./test.sh [ctest options]      for example ./test.sh -R membrane
 #
 # CORPUSCLE_DEPS  where the dependencies are (see setup.sh)
-# CORPUSCLE_JOBS  parallel compile jobs (default: number of cores)
+# CORPUSCLE_JOBS  parallel compile jobs and tests (default: number of cores)
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 case ${1:-} in
@@ -22,7 +22,7 @@ if [ "$(id -u)" = 0 ]; then # Open MPI asks root to confirm
 fi
 
 status=0
-ctest --test-dir build/openmp --output-on-failure "$@" || status=$?
+ctest --test-dir build/openmp --output-on-failure -j "$jobs" "$@" || status=$?
 if [ $status = 0 ]; then
   echo "== all tests passed"
 else

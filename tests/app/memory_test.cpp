@@ -105,7 +105,7 @@ TEST_CASE("what a cell takes of a run's memory stays below its bound") {
   constexpr int across = 4, layers = 4, cells = across * across * layers;
   const auto taken = [&](int count) {  // red cells in layers, of which there is room for all
     std::ofstream out(folder / "dense.toml");
-    out << "[time]\nstep_us = 5\nend_us = 10\n[grid]\ngenerator = \"box\"\nnodes = [45, 45, 17]\nlower_um = [0, 0, 0]\n"
+    out << "[time]\nstep_us = 5\nfirst_step_us = 5\nend_us = 10\n[grid]\ngenerator = \"box\"\nnodes = [45, 45, 17]\nlower_um = [0, 0, 0]\n"
            "upper_um = [35.2, 35.2, 12.8]\n[fluid]\nconvection = false\n[output]\nfields = false\ncells = false\n"
            "[[cell_types]]\nname = \"rbc\"\nviscosity_ratio = 5\nmembrane_viscosity_N_s_per_m = 5e-7\n";
     for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"})
