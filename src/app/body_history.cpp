@@ -101,8 +101,8 @@ HistorySample BodyHistory::cell_sample(int cell, const CellDiagnostics& d, const
   sample.elastic_energy_fJ = d.energy_fJ();
   if (!few_cells_) return sample;
   const auto& v = d.velocity_um_per_us;
-  // In a shear that goes past on both sides the way of the cell is but what rounding leaves.
-  const double slow = std::max(1e-9, 0.01 * simulation_.fluid().statistics().speed);
+  // In a shear that goes past on both sides, and once a flow has come to rest, the way of the cell is but what rounding leaves.
+  const double slow = std::max(1e-9, 0.01 * simulation_.fluid().statistics().reference_speed);
   const bool moving = std::hypot(v[0], v[1], v[2]) > slow;
   const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
                                         moving ? v : axis_at_start(sample.cell));

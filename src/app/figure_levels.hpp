@@ -15,6 +15,7 @@ struct FigureScales {
   bool convection_left_out = false;
   bool stretching = false;  // no flow: a cell pulled at its ends
   bool forces = false;      // membranes are forces
+  bool contact = false;     // that may touch
 };
 
 /// The warnings of a report, an array: each has the `figure`, its `value`, the `level`, the `key` of the case file that

@@ -164,7 +164,7 @@ void report_totals(const FlowRecord& record, const RunTotals& now, Report& repor
 void judge_figures(const FlowRecord& record, Report& report) {
   report.warnings = judge(report.errors, {record.simulation.fluid().statistics().reference_speed, record.energy.largest_fJ(),
                                           record.scene.fluid->convection == FluidSettings::Convection::none, false,
-                                          record.simulation.shared_cells() != nullptr});
+                                          record.simulation.shared_cells() != nullptr, record.scene.contact.has_value()});
   const SurfaceSet* surfaces = record.simulation.surfaces();
   name_cell(record.scene, surfaces ? surfaces->names : nullptr, record.widest, report.warnings);
 }

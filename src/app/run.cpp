@@ -163,7 +163,9 @@ void check_options(const Comm& comm, const Case& scene, const RunOptions& option
 /// A folder stands for the checkpoint in it. @throws InputError  there is none
 std::string checkpoint_path(const std::string& named) {
   std::error_code ignored;
-  if (named.empty() || !std::filesystem::is_directory(named, ignored)) return named;
+  if (named.empty()) return named;
+  if (!std::filesystem::exists(named, ignored)) throw InputError(fmt::format("--restart {}: there is no such file or folder", named));
+  if (!std::filesystem::is_directory(named, ignored)) return named;
   const auto path = std::filesystem::path(named).lexically_normal() / "checkpoint.h5";
   if (!std::filesystem::exists(path, ignored))
     throw InputError(fmt::format("--restart {}: this folder holds no checkpoint.h5", named));

@@ -35,14 +35,6 @@ void add_ranks(const Comm& comm, const View& host, std::vector<double>& values) 
   comm.sum(values.data(), static_cast<int>(values.size()));
 }
 
-/// A fixed time, whatever steps there are: means are over time. No sample is more often than whole steps are: the first ones,
-/// which may be shorter, would count for more.
-double sampling_interval(const Case& scene) {
-  constexpr double seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
-  const double step = scene.time.step_us, asked = scene.blood->sample_every_us;
-  return asked > 0 ? std::max(asked, step) : seldom * step;
-}
-
 std::string to_text(double value, const std::string& unit) {
   return fmt::format("{:.3g}{}", value, unit.empty() ? "" : unit == "_um" ? " um" : " mm/s");
 }
@@ -53,7 +45,7 @@ BloodSampler::BloodSampler(const Case& scene, FlowSimulation& simulation)
     : simulation_(simulation),
       settings_(*scene.blood),
       boundaries_(scene.boundaries),
-      every_us_(sampling_interval(scene)),
+      every_us_(scene.blood->interval_us(scene.time.step_us)),
       flow_(find_guided_flow(scene, simulation.fluid())),
       began_us_(scene.blood->from_us) {
   if (!flow_) no_flow_ = why_unguided(scene);

@@ -15,6 +15,7 @@ struct LogState {
   bool root = true, quiet = false;
   bool line_open = false;  // a progress line without its end
   bool unheard = false;    // stdout is gone
+  std::vector<std::string> told;
   spdlog::logger out{"out", std::make_shared<spdlog::sinks::stdout_sink_mt>()};
   spdlog::logger err{"err", std::make_shared<spdlog::sinks::stderr_sink_mt>()};
 
@@ -62,7 +63,11 @@ void log_warning(const std::string& message) {
   if (!log.root) return;
   log.close_line();
   log.err.warn("warning: " + message);
+  constexpr std::size_t most = 100;
+  if (log.told.size() < most) log.told.push_back(message);
 }
+
+const std::vector<std::string>& warnings_told() { return state().told; }
 
 void log_error(const std::string& message, bool everywhere) {
   auto& log = state();

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 namespace corpuscle {
 
@@ -14,6 +15,8 @@ void open_log(bool root, bool quiet = false);
 
 void log_info(const std::string& message);
 void log_warning(const std::string& message);
+/// What has been warned of so far, on rank 0; the first hundred.
+const std::vector<std::string>& warnings_told();
 /// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
 void log_error(const std::string& message, bool everywhere = false);
 

@@ -169,6 +169,7 @@ void ForceCoupling::check_start() {
   if (!wrong.empty()) throw InputError(wrong);
   coarse_ = warn_of_coarse(worst_of_types(comm, static_cast<int>(membranes_->types().size()), coarse));
   check_bodies();
+  refuse_stretched();
   try {
     place(0);
     fill_cells(0);
@@ -182,6 +183,7 @@ void ForceCoupling::check_start() {
   find_softest();
   measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
+  drawn_out_.clear();
   warn_of_ratios();
   if (small_) return membranes_->rest_at_size(1);
   warn_of_walls();

@@ -1,6 +1,9 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere but in rigid bodies, and move with it.
 #pragma once
 
+#include <map>
+#include <utility>
+
 #include "cells/shared_cells.hpp"
 #include "core/error.hpp"
 #include "coupling/cell_loads.hpp"
@@ -106,11 +109,14 @@ class ForceCoupling : public Coupling {
   void limit_slip(double dt_us);
   std::string vertex_text(int vertex) const;
   double second_order_share() const;
+  using Kind = std::pair<int, Triple>;  // type, and by how much a cell starts drawn out
   struct Spacings {
-    double narrowest = 1e30, widest = 0;  // um
-    std::vector<int> numbers;             // of the cells that stand for their types
+    double narrowest = 1e30, widest = 0;   // um
+    std::vector<std::vector<int>> numbers;  // [kind] of the cells that stand for it
   };
   Spacings spacings_of_cells();
+  Kind kind_of(const CellRecord& cell) const;
+  void refuse_stretched() const;
   void measure_stability();
   void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers);
   void refuse_long_steps() const;
@@ -140,6 +146,7 @@ class ForceCoupling : public Coupling {
   std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
   Components<double> followed_;                 // [vertex, 1] share of the forces that slip follows; only with slip
   std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
+  std::map<int, Kind> drawn_out_;  // by number, cells that start so, until the start has been checked
   double quiet_speed_;        // um/us: what counts as rest
   std::string coarse_;        // which cells the grid resolves coarsely
   /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.

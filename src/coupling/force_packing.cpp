@@ -25,6 +25,9 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   const CellPlaces places = find_places(scene, grid, packed);
   cells_ = std::make_unique<SharedCells>(places, grid, IndexSpace::halo, contact_um, workspace_);
   membranes_ = &cells_->membranes();
+  for (std::size_t c = 0; c < places.cells.size(); ++c)
+    if (const CellPlace& cell = places.cells[c]; cell.start_stretch != Triple{1, 1, 1})
+      drawn_out_[static_cast<int>(c)] = {cell.type, cell.start_stretch};
   if (scene.populations.empty()) return;
   packing_ = report_of(scene, places, grid.total_volume());
   packed_ = share_of(places, grid.comm());

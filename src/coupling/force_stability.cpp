@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "core/error.hpp"
 #include "coupling/force_coupling.hpp"
@@ -69,8 +70,14 @@ void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std
   membranes_->take_share_of_resistance(short_waves_);
 }
 
+/// Cells that start drawn out may be stiffer than others of their type.
+ForceCoupling::Kind ForceCoupling::kind_of(const CellRecord& cell) const {
+  const auto found = drawn_out_.find(cell.number);
+  return found == drawn_out_.end() ? Kind{cell.type, {1, 1, 1}} : found->second;
+}
+
 /// Of a cell the grid's spacings count as what they are over its vertices in the mean: the narrowest that a cell of a tube reaches have too little
-/// say to be waited for, but where all of them are narrow, as inside a bend, that cell is. Slip grows with the spacing: of each type the first
+/// say to be waited for, but where all of them are narrow, as inside a bend, that cell is. Slip grows with the spacing: of each kind the first
 /// cell, that in the narrowest and that in the widest spacings stand for all, the same ones on any number of ranks.
 ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
   constexpr double rounding = 1e-9, none = std::numeric_limits<int>::max();
@@ -89,23 +96,27 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
       of_cell[c] = {std::min(of_cell[c].first, mean), std::max(of_cell[c].second, mean)};
     }
   const Comm& comm = fluid_.grid().comm();
+  std::set<Kind> kinds;
+  for (std::size_t t = 0; t < membranes_->types().size(); ++t) kinds.insert({static_cast<int>(t), {1, 1, 1}});
+  for (const auto& [number, kind] : drawn_out_) kinds.insert(kind);
   Spacings result;
-  for (std::size_t t = 0; t < membranes_->types().size(); ++t) {
+  for (const Kind& kind : kinds) {
     double narrowest = 1e30, widest = 0;
     for (std::size_t c = 0; c < own.size(); ++c)
-      if (own[c].type == static_cast<int>(t)) narrowest = std::min(narrowest, of_cell[c].first), widest = std::max(widest, of_cell[c].second);
+      if (kind_of(own[c]) == kind) narrowest = std::min(narrowest, of_cell[c].first), widest = std::max(widest, of_cell[c].second);
     narrowest = comm.min(narrowest), widest = comm.max(widest);
+    if (widest == 0) continue;  // no cell is of it
     result.narrowest = std::min(result.narrowest, narrowest), result.widest = std::max(result.widest, widest);
     double number[3] = {none, none, none};
     for (std::size_t c = 0; c < own.size(); ++c) {
-      if (own[c].type != static_cast<int>(t)) continue;
+      if (kind_of(own[c]) != kind) continue;
       const bool stands[3] = {true, of_cell[c].first <= narrowest * (1 + rounding), of_cell[c].second >= widest * (1 - rounding)};
       for (int n = 0; n < 3; ++n)
         if (stands[n]) number[n] = std::min(number[n], static_cast<double>(own[c].number));
     }
-    for (double& n : number)
-      if ((n = comm.min(n)) < none && std::find(result.numbers.begin(), result.numbers.end(), static_cast<int>(n)) == result.numbers.end())
-        result.numbers.push_back(static_cast<int>(n));
+    std::set<int> standing;
+    for (const double n : number) standing.insert(static_cast<int>(comm.min(n)));
+    result.numbers.emplace_back(standing.begin(), standing.end());
   }
   return result;
 }
@@ -117,7 +128,7 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
 /// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane viscosity
 /// lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
 /// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.02 of that and one grew slowly at 0.03: a
-/// fiftieth of it counts, where that is more than what they stand without.
+/// fiftieth of it counts, where that is more than what they stand without. Each kind of cell by itself: some may have no viscosity.
 void ForceCoupling::measure_stability() {
   constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 50;
   update_surface_geometry(surfaces());
@@ -136,11 +147,16 @@ void ForceCoupling::measure_stability() {
   }
   // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
   const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
-  anticipate_short_waves(model, numbers);
-  held_rate_ = comm.max(membranes_->fastest_held_relaxation_per_us(numbers, beta));
-  double fastest = comm.max(membranes_->fastest_relaxation_per_us(model, numbers));
-  if (membranes_->viscosity())
-    fastest = std::min(fastest, of_viscous * comm.max(membranes_->fastest_relaxation_per_us(model, numbers, beta)));
+  std::vector<int> standing;
+  for (const auto& of_kind : numbers) standing.insert(standing.end(), of_kind.begin(), of_kind.end());
+  anticipate_short_waves(model, standing);
+  held_rate_ = comm.max(membranes_->fastest_held_relaxation_per_us(standing, beta));
+  double fastest = 0;
+  for (const auto& of_kind : numbers) {
+    double rate = comm.max(membranes_->fastest_relaxation_per_us(model, of_kind));
+    if (membranes_->viscosity()) rate = std::min(rate, of_viscous * comm.max(membranes_->fastest_relaxation_per_us(model, of_kind, beta)));
+    fastest = std::max(fastest, rate);
+  }
   if (loads_) fastest = std::max(fastest, comm.max(loads_->fastest_relaxation_per_us()));
   stable_us_ = limit / fastest;
 }

@@ -2,6 +2,7 @@
 // file leaves out is an empty optional or vector here, and the module it stands for is never built.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -205,6 +206,12 @@ struct BloodSettings {
   int bins = 0;                         // of profiles; 0: about a spacing wide
   double layer_window_um = 1;           // length of the windows in which the outermost membrane is looked for
 
+  /// Of samples, a fixed time, whatever steps there are: means are over time. No more often than whole steps are: the first ones, which
+  /// may be shorter, would count for more.
+  double interval_us(double step_us) const {
+    constexpr double seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
+    return sample_every_us > 0 ? std::max(sample_every_us, step_us) : seldom * step_us;
+  }
   bool operator==(const BloodSettings&) const = default;
 };
 

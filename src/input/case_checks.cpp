@@ -226,14 +226,19 @@ void check_sampling(const Case& scene, const Complaint& complain) {
     complain("blood", "from_us",
              fmt::format("sampling would begin at {:g} us, and the run ends at {:g} us (time.end_us): begin earlier, or run longer",
                          scene.blood->from_us, scene.time.end_us));
-  else if (scene.blood && scene.blood->sample_every_us > 0) {
-    const double every = std::max(scene.blood->sample_every_us, scene.time.step_us), last = every * std::floor(scene.time.end_us / every + 1e-9);
-    if (last <= 0 || last < scene.blood->from_us)
-      complain("blood", "sample_every_us",
-               fmt::format("no sample, of those at whole multiples of it, falls between blood.from_us = {:g} us and time.end_us = {:g} us: sample more "
-                           "often, or run longer",
-                           scene.blood->from_us, scene.time.end_us));
-  }
+  else if (scene.blood && scene.blood->sample_every_us > 0 && !is_sampled(scene))
+    complain("blood", "sample_every_us",
+             fmt::format("no sample, of those at whole multiples of it, falls between blood.from_us = {:g} us and time.end_us = {:g} us: sample more "
+                         "often, or run longer",
+                         scene.blood->from_us, scene.time.end_us));
+}
+
+bool is_sampled(const Case& scene) {
+  constexpr double rounding = 1e-9;
+  const double step = scene.time.step_us, every = scene.blood->interval_us(step);
+  const double last = every * std::floor(scene.time.end_us / every + rounding);
+  const double taken = step * std::ceil(last / step - rounding);  // at the end of the step that has come to it
+  return last > 0 && taken >= scene.blood->from_us * (1 - rounding);
 }
 
 }  // namespace corpuscle

@@ -20,6 +20,9 @@ void check_modules(const Case& scene, const Complaint& complain);
 /// After [time]: whether anything is sampled at all.
 void check_sampling(const Case& scene, const Complaint& complain);
 
+/// Whether a run to its end takes a sample of blood. @pre scene.blood
+bool is_sampled(const Case& scene);
+
 /// Once [output] is read.
 void check_output(const Case& scene, const Complaint& complain);
 

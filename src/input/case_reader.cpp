@@ -62,6 +62,7 @@ class CaseReader {
     scene.output = one<OutputSettings>("output", [&](Section& s) { return read_output(s, has_fluid, has_surfaces); });
     check_output(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     note_often_history(scene);
+    note_no_samples(scene);
     note_sharp_aggregation(scene);
     scene.resolved = echo_;
     return scene;
@@ -171,6 +172,13 @@ class CaseReader {
     if (scene.stretching || every == 0 || every >= 0.5 * shortest) return;
     scene.remarks.push_back(fmt::format("output.history_every_us = {:g} is less than the shortest step, {:g} us: each step is a line, "
                                         "as with 0", every, shortest));
+  }
+
+  static void note_no_samples(Case& scene) {
+    if (!scene.blood || is_sampled(scene)) return;
+    scene.remarks.push_back(fmt::format("blood.sample_every_us: unless it is set, samples are ten steps apart, {:g} us, and none of them falls between "
+                                        "blood.from_us = {:g} us and time.end_us = {:g} us: nothing of blood will be told",
+                                        scene.blood->interval_us(scene.time.step_us), scene.blood->from_us, scene.time.end_us));
   }
 
   /// Types that no cell is of.

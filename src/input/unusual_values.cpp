@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "core/units.hpp"
 
 namespace corpuscle {
@@ -21,7 +23,11 @@ constexpr Usual membrane_viscosity{1e-9, 1e-6, 50, "N s/m", "red cells have", "1
 constexpr Usual mass{27, 10000, 50, "pg", "cells have", "1 ng = 1000 pg, 1 kg = 1e15 pg"};
 constexpr Usual density{0.7, 2, 10, "pg/um3", "watery fluids have about 1, all fluids",
                         "1000 kg/m3 = 1 g/cm3 = 1 pg/um3"};
+constexpr Usual pressure_gradient{0, 10, 100, "Pa/um", "vessels have", "1 mmHg/mm = 0.133 Pa/um, 1 kPa/mm = 1 Pa/um"};
+constexpr Usual push{0, 1, 50, "nN", "tweezers and pipettes have", "1 pN = 0.001 nN, 1 uN = 1000 nN"};
 constexpr Usual kinematic_viscosity{0.5, 100, 50, "um2/us", "plasma has about 1.1, thickened media", "1e-6 m2/s = 1 mm2/s = 1 um2/us"};
+
+double length(const Triple& a) { return std::hypot(a[0], a[1], a[2]); }
 
 struct Texts {
   std::vector<std::string> all;
@@ -51,11 +57,14 @@ std::vector<std::string> unusual_values(const Case& scene) {
   if (scene.fluid) {
     texts.look("fluid.density_pg_per_um3", scene.fluid->density_pg_per_um3, density);
     texts.look("fluid.kinematic_viscosity_um2_per_us", scene.fluid->kinematic_viscosity_um2_per_us, kinematic_viscosity);
+    texts.look("fluid.pressure_gradient_Pa_per_um", length(scene.fluid->pressure_gradient_Pa_per_um), pressure_gradient);
   }
   for (std::size_t t = 0; t < scene.cell_types.size(); ++t)
     look_at(scene.cell_types[t].cell, fmt::format("cell_types.{}", t), as_forces, texts);
-  for (std::size_t c = 0; c < scene.cells.size(); ++c)
+  for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     if (scene.cells[c].type < 0) look_at(scene.cells[c], fmt::format("cells.{}", c), as_forces, texts);
+    texts.look(fmt::format("cells.{}.push_nN", c), length(scene.cells[c].push_nN), push);
+  }
   return texts.all;
 }
 

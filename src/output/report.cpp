@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "common/types.hpp"
+#include "core/log.hpp"
 #include "output/on_root.hpp"
 #include "output/text_file.hpp"
 
@@ -91,6 +92,7 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
        {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
     if (!json["errors"].contains(name)) json["errors"][name] = nullptr;
   json["warnings"] = report.warnings;
+  json["told"] = warnings_told();
   json["quantities"] = report.quantities;
   if (!report.error_bars.empty()) json["error_bars"] = report.error_bars;
   const auto path = (std::filesystem::path(folder) / "report.json").string();

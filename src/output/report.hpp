@@ -47,7 +47,7 @@ struct Report {
   nlohmann::json extra = nlohmann::json::object();
 };
 
-/// Write `folder`/report.json. All ranks call: wall_s_by_part is the largest over the ranks, memory is summed.
+/// Write `folder`/report.json, with all that has been warned of so far as `told`. All ranks call: wall_s_by_part is the largest over the ranks, memory is summed.
 /// @throws InputError, ComputationError  on every rank, if the file cannot be written
 void write_report(const std::string& folder, const Comm& comm, const Report& report);
 

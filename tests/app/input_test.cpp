@@ -236,7 +236,7 @@ TEST_CASE("checkpoints that do not fit") {
   const auto again = coarse_tube("out", {"time.end_us=4"});
   SECTION("no checkpoint at all") {
     std::ofstream(folder / "text.h5") << "not HDF5, and long enough to hold a signature\n";
-    refuse_restart(again, "missing.h5", {"missing.h5", "no such file"});
+    refuse_restart(again, "missing.h5", {"--restart missing.h5", "no such file"});
     refuse_restart(again, "text.h5", {"text.h5", "not an HDF5 file"});
     refuse_restart(again, "good/fields.h5", {"good/fields.h5", "not a checkpoint"});
   }

@@ -131,6 +131,21 @@ TEST_CASE("a gradient that nothing holds against is warned of") {
   CHECK_THAT(check({"boundary.2.type=wall", "boundary.3.type=wall"}), !Contains("nothing holds the fluid"));
 }
 
+TEST_CASE("what is warned of before and during a run is in its report") {
+  const auto folder = fresh_folder("told");
+  const Words words = with({"run", scene("two_cells"), "--out", "out"}, {"grid.nodes=[13,13,13]", "cell_types.0.vertices=200", "time.step_us=2",
+                                                                         "time.end_us=4", "output.fields=false"});
+  const auto of_ratio = [&] {
+    int found = 0;
+    for (const auto& text : report(folder / "out")["told"]) found += text.get<std::string>().rfind("viscosity_ratio = 20: ", 0) == 0;
+    return found;
+  };
+  succeed(folder, with(words, {"cell_types.0.viscosity_ratio=20"}));
+  CHECK(of_ratio() == 1);
+  succeed(folder, words);
+  CHECK(of_ratio() == 0);
+}
+
 TEST_CASE("warnings name the keys of types where cells have types") {
   const auto folder = fresh_folder("named_types");
   succeed(folder, with({"run", scene("two_cells"), "--out", "out"},

@@ -102,6 +102,13 @@ TEST_CASE("what membranes as forces leave of the energy is judged by their own g
   CHECK(figures_of(judge({{"energy_balance", 0.4}, {"energy_balance_coupling", 0.4}}, forces)) ==
         Words{"energy_balance", "energy_balance_coupling"});
   CHECK(judge({{"energy_balance", 0.02}}, forces).empty());
+  // Only where there is contact is its range a remedy.
+  for (const bool contact : {false, true}) {
+    forces.contact = contact;
+    const auto warnings = judge(errors, forces);
+    REQUIRE(warnings.size() == 1);
+    CHECK((warnings[0]["message"].get<std::string>().find("contact.range_um") != std::string::npos) == contact);
+  }
 }
 
 TEST_CASE("a share of nothing is no warning") {

@@ -242,6 +242,47 @@ TEST_CASE("steps that are not refused are stable without slip, in bends, and wit
   }
 }
 
+TEST_CASE("the longest step is that of the stiffest kind of cell, in whatever order they come", "[coupling][force][ranks]") {
+  // Of one type, and one of them drawn out to where it is stiffer; and a stiff viscous one beside a soft one of no viscosity.
+  const auto longest = [](std::vector<CellSettings> cells) {
+    Case scene;
+    scene.grid = GridSettings{};
+    scene.grid->nodes = {29, 15, 15};
+    scene.grid->lower_um = {-9, -4.5, -4.5}, scene.grid->upper_um = {9, 4.5, 4.5};
+    scene.fluid = FluidSettings{};
+    scene.fluid->convection = FluidSettings::Convection::none;
+    scene.boundaries = sides(Type::wall);
+    scene.coupling = CouplingSettings{};
+    scene.coupling->scheme = CouplingSettings::Scheme::force;
+    scene.coupling->slip = false;
+    for (std::size_t n = 0; n < cells.size(); ++n) cells[n].center_um = {n == 0 ? -4.3 : 4.4, 0.2, 0.1};
+    scene.cells = cells;
+    scene.time = {1e6, 1e6};
+    const std::string text = refusal(scene);
+    INFO(text);
+    REQUIRE(text.find("above about") != std::string::npos);
+    return std::stod(text.substr(text.find("above about") + 12));
+  };
+  CellSettings still;
+  still.shape = CellSettings::Shape::sphere;
+  still.radius_um = 2;
+  still.vertices = 300;
+  still.law = CellSettings::Law::skalak;
+  still.shear_modulus_uN_per_m = 10;
+  CellSettings drawn = still;
+  drawn.start_stretch = {1.3, 0.9, 0.9};
+  CellSettings soft = still, viscous = still;
+  soft.shear_modulus_uN_per_m = 2;
+  viscous.shear_modulus_uN_per_m = 500, viscous.membrane_viscosity_N_s_per_m = 1e-6;
+  for (const auto& [a, b] : {std::pair{still, drawn}, std::pair{soft, viscous}}) {
+    const double one = longest({a}), other = longest({b}), both = longest({a, b});
+    INFO(one << ", " << other << " us, together " << both);
+    CHECK(std::abs(one / other - 1) > 0.1);
+    CHECK(both == Approx(std::min(one, other)).epsilon(0.03));
+    CHECK(longest({b, a}) == Approx(both).epsilon(0.006));  // of three digits
+  }
+}
+
 TEST_CASE("membrane viscosity shortens no steps, and as long ones are stable", "[coupling][force]") {
   const double viscosity = GENERATE(5e-7, 5e-8);
   const bool slip = GENERATE(true, false);

@@ -297,6 +297,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(blood("sample_every_us = 1e9"), {":15: blood.sample_every_us", "no sample, of those"});
   require_parts(blood("from_us = 9\nsample_every_us = 4"), {":16: blood.sample_every_us", "no sample"});
   REQUIRE(blood("from_us = 7\nsample_every_us = 4") == "accepted");  // at 8 us
+  REQUIRE(blood("from_us = 9.5\nsample_every_us = 4.6") == "accepted");  // of 9.2 us, at 10: the first step that has come to it
   require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});
   require_parts(message(flow + "\n[output]\nfields = [\"wall_stress\"]\n"), {"output.fields", "\"wall_shear_stress\""});
   require_parts(cell("[output]\ncells_in_history = -1"), {":13: output.cells_in_history = -1", "from 0"});
