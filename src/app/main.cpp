@@ -208,6 +208,7 @@ int main(int argc, char** argv) {
   }
 #ifdef CORPUSCLE_MPI
   const bool alone = can_stay_alone(command);
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);  // without mpirun Open MPI needs no daemon: it takes longer to start than small scenes run
   if (!alone) MPI_Init(&argc, &argv);
 #endif
   int code = 0;

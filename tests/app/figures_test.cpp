@@ -122,6 +122,18 @@ TEST_CASE("a Robin coefficient far above its default is said") {
              Contains("coupling.robin_coefficient_pg_per_um2_per_us"));
 }
 
+TEST_CASE("a cell in a flow that comes to rest is measured along one axis") {
+  // What drift is left is none to go by, however slow the flow has become: its length was 2.9, 6.3 and 2.9 um in turn.
+  const auto folder = fresh_folder("one_axis");
+  succeed(folder, with({"run", scene("relax"), "--out", "out"},
+                       {"grid.nodes=[17,17,17]", "cells.0.vertices=250", "cells.0.start_stretch=[1.5,0.7,1]", "cells.0.membrane_viscosity_N_s_per_m=0",
+                        "time.step_us=50", "time.end_us=4500", "output.every_us=0", "output.history_every_us=250"}));
+  const auto samples = history(folder / "out");
+  REQUIRE(samples.lines.size() > 15);
+  for (std::size_t n = 1; n < samples.lines.size(); ++n)
+    CHECK(std::abs(samples.number(n, "length_um") - samples.number(n - 1, "length_um")) < 0.5);
+}
+
 TEST_CASE("a cell is at the outflow when it is, whatever the speed that shear modulus over viscosity is") {
   const auto folder = fresh_folder("outflow");
   const auto outcome = start(folder, coarse_tube("out", {"time.end_us=3", "fluid.kinematic_viscosity_um2_per_us=1e-9"}));
