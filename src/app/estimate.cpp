@@ -130,11 +130,19 @@ double cells_of(const PopulationSettings& population, const Case& scene, const S
   return population.count > 0 ? population.count : population.hematocrit * size.volume / volume_of(cell);
 }
 
+/// A type counts once, and up to twice more for those of its cells that start drawn out.
 double pairs_of_types(const Case& scene) {
+  constexpr int most_drawn_out = 2;
   std::vector<const CellSettings*> types;
   const auto add = [&](const CellSettings& cell) {
-    if (std::none_of(types.begin(), types.end(), [&](const CellSettings* known) { return same_type(cell, *known); }))
-      types.push_back(&cell);
+    int same = 0;
+    const bool rest = cell.start_stretch == Triple{1, 1, 1};
+    for (const CellSettings* known : types) {
+      if (!same_type(cell, *known)) continue;
+      if (known->start_stretch == cell.start_stretch) return;
+      same += known->start_stretch != Triple{1, 1, 1};
+    }
+    if (rest || same < most_drawn_out) types.push_back(&cell);
   };
   for (const auto& cell : scene.cells) add(cell);
   for (const auto& population : scene.populations) add(scene.cell_types[population.type].cell);

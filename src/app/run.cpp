@@ -98,6 +98,7 @@ ExitCode compare(const Comm& comm, const Bars& bars, const CoarserRun& run, cons
   const std::string own_folder = main.folder + "/coarser_" + run.kind;
   ExitCode code = exit_done;
   reason.clear();
+  WarningsTold of_main = exchange_warnings({});
   try {
     Case coarser = read_case(bars.file, overrides);
     const auto files = fingerprint_files(comm, coarser);
@@ -115,6 +116,7 @@ ExitCode compare(const Comm& comm, const Bars& bars, const CoarserRun& run, cons
     if (comm.size() > 1) throw;  // perhaps on some ranks only; the main run's report is written
     reason = error.what();
   }
+  exchange_warnings(std::move(of_main));
   open_log(comm.root());
   return code;
 }
@@ -162,9 +164,10 @@ void check_options(const Comm& comm, const Case& scene, const RunOptions& option
 
 /// A folder stands for the checkpoint in it. @throws InputError  there is none
 std::string checkpoint_path(const std::string& named) {
-  std::error_code ignored;
+  std::error_code ignored, why;
   if (named.empty()) return named;
-  if (!std::filesystem::exists(named, ignored)) throw InputError(fmt::format("--restart {}: there is no such file or folder", named));
+  if (!std::filesystem::exists(named, why))
+    throw InputError(fmt::format("--restart {}: {}", named, why ? why.message() : "there is no such file or folder"));
   if (!std::filesystem::is_directory(named, ignored)) return named;
   const auto path = std::filesystem::path(named).lexically_normal() / "checkpoint.h5";
   if (!std::filesystem::exists(path, ignored))

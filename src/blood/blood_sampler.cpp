@@ -251,7 +251,7 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
     if (!block.contains(name)) missing[name] = why;
   };
   if (samples() == 0) {
-    missing["all"] = "nothing was sampled: the run ended before blood.from_us";
+    missing["all"] = "nothing was sampled: the run ended before blood.from_us, or before the first multiple of blood.sample_every_us after it";
     return;
   }
   const std::string undriven = "no flow is driven through the grid in one direction" + (flow_ ? "" : ": " + no_flow_);

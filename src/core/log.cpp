@@ -15,7 +15,7 @@ struct LogState {
   bool root = true, quiet = false;
   bool line_open = false;  // a progress line without its end
   bool unheard = false;    // stdout is gone
-  std::vector<std::string> told;
+  WarningsTold told;
   spdlog::logger out{"out", std::make_shared<spdlog::sinks::stdout_sink_mt>()};
   spdlog::logger err{"err", std::make_shared<spdlog::sinks::stderr_sink_mt>()};
 
@@ -64,10 +64,15 @@ void log_warning(const std::string& message) {
   log.close_line();
   log.err.warn("warning: " + message);
   constexpr std::size_t most = 100;
-  if (log.told.size() < most) log.told.push_back(message);
+  if (log.told.texts.size() < most)
+    log.told.texts.push_back(message);
+  else
+    ++log.told.more;
 }
 
-const std::vector<std::string>& warnings_told() { return state().told; }
+const WarningsTold* warnings_told() { return state().root ? &state().told : nullptr; }
+
+WarningsTold exchange_warnings(WarningsTold told) { return std::exchange(state().told, std::move(told)); }
 
 void log_error(const std::string& message, bool everywhere) {
   auto& log = state();

@@ -15,8 +15,15 @@ void open_log(bool root, bool quiet = false);
 
 void log_info(const std::string& message);
 void log_warning(const std::string& message);
-/// What has been warned of so far, on rank 0; the first hundred.
-const std::vector<std::string>& warnings_told();
+/// What has been warned of so far, on the rank that speaks: the first hundred, and of how many more there is none of the texts.
+struct WarningsTold {
+  std::vector<std::string> texts;
+  long more = 0;
+};
+/// Null on ranks that do not speak.
+const WarningsTold* warnings_told();
+/// For a run within a run. @return what has been warned of before
+WarningsTold exchange_warnings(WarningsTold told);
 /// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
 void log_error(const std::string& message, bool everywhere = false);
 

@@ -3,6 +3,7 @@
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/flow_checks.hpp"
+#include "parallel/agree.hpp"
 
 #include <fmt/format.h>
 
@@ -47,6 +48,28 @@ void warn_of_free_fluid(const Case& scene) {
        1e3 * gradient / scene.fluid->density_pg_per_um3);
 }
 
+/// @throws InputError  for cells drawn out so far that the first step would find their area senseless
+void refuse_stretched(const Comm& comm, const Case& scene, Membranes& membranes) {
+  const auto starts_drawn = [](const CellSettings& cell) { return cell.start_stretch != Triple{1, 1, 1}; };
+  if (std::none_of(scene.cells.begin(), scene.cells.end(), starts_drawn)) return;
+  std::string wrong;
+  const auto cells = membranes.diagnostics();
+  for (std::size_t c = 0; c < cells.size() && wrong.empty(); ++c) {
+    const int cell = static_cast<int>(c), number = membranes.number(cell);
+    if (number >= static_cast<int>(scene.cells.size()) || !starts_drawn(scene.cells[number])) continue;
+    if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
+    const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
+    if (area <= Membranes::senseless_area) continue;
+    const Triple& stretch = scene.cells[number].start_stretch;
+    wrong = fmt::format("{}.start_stretch = [{:g}, {:g}, {:g}]: its membrane's area is {:.0f} % off that at rest then, a real one breaks at about "
+                        "{:.0f} %, and a run stops at {:.0f} %: draw the cell out less",
+                        membranes.name(cell), stretch[0], stretch[1], stretch[2], 100 * area, 100 * Membranes::lysis_area,
+                        100 * Membranes::senseless_area);
+  }
+  wrong = agree(comm, wrong);
+  if (!wrong.empty()) throw InputError(wrong);
+}
+
 }  // namespace
 
 FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& timers, const PackedCells* packed)
@@ -63,6 +86,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   if (scene.has_cells())
     if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back()); !text.empty()) warn("{}", text);
   if (!membranes()) return;
+  refuse_stretched(comm, scene, *membranes());
   membranes()->limit_area(Membranes::senseless_area);
   membranes()->limit_volume(Membranes::senseless_volume);
 }

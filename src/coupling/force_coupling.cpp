@@ -169,7 +169,6 @@ void ForceCoupling::check_start() {
   if (!wrong.empty()) throw InputError(wrong);
   coarse_ = warn_of_coarse(worst_of_types(comm, static_cast<int>(membranes_->types().size()), coarse));
   check_bodies();
-  refuse_stretched();
   try {
     place(0);
     fill_cells(0);

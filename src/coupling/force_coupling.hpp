@@ -115,10 +115,10 @@ class ForceCoupling : public Coupling {
     std::vector<std::vector<int>> numbers;  // [kind] of the cells that stand for it
   };
   Spacings spacings_of_cells();
+  static std::map<int, Kind> farthest(const std::map<int, Kind>& drawn_out);
   Kind kind_of(const CellRecord& cell) const;
-  void refuse_stretched() const;
   void measure_stability();
-  void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers);
+  void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers, Membranes& standing);
   void refuse_long_steps() const;
   double next_step_us(double time_us, double dt_us) const;
 

@@ -28,6 +28,7 @@ void ForceCoupling::take_places(const Case& scene, const PackedCells* packed, do
   for (std::size_t c = 0; c < places.cells.size(); ++c)
     if (const CellPlace& cell = places.cells[c]; cell.start_stretch != Triple{1, 1, 1})
       drawn_out_[static_cast<int>(c)] = {cell.type, cell.start_stretch};
+  drawn_out_ = farthest(drawn_out_);
   if (scene.populations.empty()) return;
   packing_ = report_of(scene, places, grid.total_volume());
   packed_ = share_of(places, grid.comm());

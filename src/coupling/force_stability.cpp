@@ -63,11 +63,27 @@ double ForceCoupling::resisting_share() const {
 }
 
 /// Where beta alone stands for the fluid's answer, short waves wait for it, 1 / (beta m) steps where a wave's mobility is m.
-void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers) {
+void ForceCoupling::anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers, Membranes& standing) {
   constexpr double share = 0.5;  // unstable above 4/3
-  const double resistance = fluid_.grid().comm().max(membranes_->largest_resistance(model, numbers));
+  const double resistance = fluid_.grid().comm().max(standing.largest_resistance(model, numbers));
   short_waves_ = resistance > 0 ? share / resistance : 0;
-  membranes_->take_share_of_resistance(short_waves_);
+  for (Membranes* each : {membranes_, &standing}) each->take_share_of_resistance(short_waves_);
+}
+
+/// Of a type's cells that start drawn out, no more than these stand for all: that drawn out most, and that pressed together most.
+std::map<int, ForceCoupling::Kind> ForceCoupling::farthest(const std::map<int, Kind>& drawn_out) {
+  std::map<int, Kind> longest, flattest, result;  // by type
+  const auto share = [](const Triple& a, double of) { return of / std::cbrt(a[0] * a[1] * a[2]); };
+  const auto most = [&](const Kind& kind) { return share(kind.second, std::max({kind.second[0], kind.second[1], kind.second[2]})); };
+  const auto least = [&](const Kind& kind) { return share(kind.second, std::min({kind.second[0], kind.second[1], kind.second[2]})); };
+  for (const auto& [number, kind] : drawn_out) {
+    const auto longer = longest.try_emplace(kind.first, kind).first, flatter = flattest.try_emplace(kind.first, kind).first;
+    if (most(kind) > most(longer->second)) longer->second = kind;
+    if (least(kind) < least(flatter->second)) flatter->second = kind;
+  }
+  for (const auto& [number, kind] : drawn_out)
+    if (kind == longest.at(kind.first) || kind == flattest.at(kind.first)) result.emplace(number, kind);
+  return result;
 }
 
 /// Cells that start drawn out may be stiffer than others of their type.
@@ -135,26 +151,31 @@ void ForceCoupling::measure_stability() {
   transfer_->place(surfaces().x);
   const Comm& comm = fluid_.grid().comm();
   const auto [narrowest, widest, numbers] = spacings_of_cells();
+  std::vector<int> all;
+  for (const auto& of_kind : numbers) all.insert(all.end(), of_kind.begin(), of_kind.end());
+  const auto standing = membranes_->only(all);
+  update_surface_geometry(standing->surfaces());
   MobilityModel model;
   model.viscosity = fluid_.viscosity() * resisting_share();
   model.radius = transfer_->marker_radius() * narrowest;
   if (scene_.coupling->slip) {
     for (auto& column : model.slip) column = Components<double>("corpuscle::coupling::slip", surfaces().vertices, 3);
     slip_columns(transfer_->block(), slip_of_membranes(), transfer_->views(), model.slip);
-    for (auto& column : model.slip) cells_->add_copies(column);
+    for (auto& column : model.slip) {
+      cells_->add_copies(column);
+      column = membranes_->rows_of(all, column);
+    }
     model.dipole = of_dipoles * transfer_->largest_dipole() * resisting_share() * widest;
     model.width = 0.8 * narrowest;
   }
   // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
   const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
-  std::vector<int> standing;
-  for (const auto& of_kind : numbers) standing.insert(standing.end(), of_kind.begin(), of_kind.end());
-  anticipate_short_waves(model, standing);
-  held_rate_ = comm.max(membranes_->fastest_held_relaxation_per_us(standing, beta));
+  anticipate_short_waves(model, all, *standing);
+  held_rate_ = comm.max(standing->fastest_held_relaxation_per_us(all, beta));
   double fastest = 0;
   for (const auto& of_kind : numbers) {
-    double rate = comm.max(membranes_->fastest_relaxation_per_us(model, of_kind));
-    if (membranes_->viscosity()) rate = std::min(rate, of_viscous * comm.max(membranes_->fastest_relaxation_per_us(model, of_kind, beta)));
+    double rate = comm.max(standing->fastest_relaxation_per_us(model, of_kind));
+    if (membranes_->viscosity()) rate = std::min(rate, of_viscous * comm.max(standing->fastest_relaxation_per_us(model, of_kind, beta)));
     fastest = std::max(fastest, rate);
   }
   if (loads_) fastest = std::max(fastest, comm.max(loads_->fastest_relaxation_per_us()));

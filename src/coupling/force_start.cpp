@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "contact/wall_contact.hpp"
-#include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/force_coupling.hpp"
 #include "fluid/boundary_conditions.hpp"
@@ -28,28 +27,6 @@ double shear_modulus(const MembraneLaw& law) {
 }
 
 }  // namespace
-
-/// @throws InputError  for cells drawn out so far that the first step would find their area senseless
-void ForceCoupling::refuse_stretched() const {
-  std::string wrong;
-  if (!drawn_out_.empty()) {
-    const auto cells = membranes_->diagnostics();
-    for (std::size_t c = 0; c < cells.size() && wrong.empty(); ++c) {
-      const int cell = static_cast<int>(c);
-      const auto found = drawn_out_.find(membranes_->number(cell));
-      if (found == drawn_out_.end() || !(std::holds_alternative<WlcPow>(membranes_->law(cell)) || membranes_->holds_area(cell))) continue;
-      const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
-      if (area <= Membranes::senseless_area) continue;
-      const Triple& stretch = found->second.second;
-      wrong = fmt::format("{}.start_stretch = [{:g}, {:g}, {:g}]: its membrane's area is {:.0f} % off that at rest then, a real one breaks at "
-                          "about {:.0f} %, and a run stops at {:.0f} %: draw the cell out less",
-                          membranes_->name(cell), stretch[0], stretch[1], stretch[2], 100 * area, 100 * Membranes::lysis_area,
-                          100 * Membranes::senseless_area);
-    }
-  }
-  wrong = agree(fluid_.grid().comm(), wrong);
-  if (!wrong.empty()) throw InputError(wrong);
-}
 
 /// Without contact nothing but the fluid keeps cells from a wall, and between nodes there is none.
 void ForceCoupling::warn_of_walls() const {

@@ -108,7 +108,39 @@ void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
   }
 }
 
-void Membranes::rest_at_size(double size) { fill_reference(views_, types_, size); }
+void Membranes::rest_at_size(double size) {
+  fill_reference(views_, types_, size);
+  size_ = size;
+}
+
+std::unique_ptr<Membranes> Membranes::only(const std::vector<int>& numbers) const {
+  auto few = std::make_unique<Membranes>(types_, std::make_shared<Workspace>());
+  const auto type = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.type);
+  std::vector<HeldCell> cells;
+  for (int c : cells_of(numbers)) cells.push_back({type(c), number(c)});
+  few->rest_at_size(size_);
+  few->hold(cells, static_cast<int>(cells.size()));
+  if (cells.empty()) return few;
+  const Components<double> x = rows_of(numbers, views_.surface.x);
+  Kokkos::deep_copy(Kokkos::subview(few->views_.surface.x, std::make_pair(std::size_t(0), x.extent(0)), Kokkos::ALL), x);
+  return few;
+}
+
+Components<double> Membranes::rows_of(const std::vector<int>& numbers, const Components<double>& values) const {
+  const auto first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.surface.first_vertex);
+  const std::vector<int> cells = cells_of(numbers);
+  std::size_t vertices = 0;
+  for (int c : cells) vertices += first(c + 1) - first(c);
+  const Components<double> rows(uninitialised("corpuscle::membrane::rows_vertex"), vertices, 3);
+  std::size_t at = 0;
+  for (int c : cells) {
+    const std::size_t count = first(c + 1) - first(c);
+    Kokkos::deep_copy(Kokkos::subview(rows, std::make_pair(at, at + count), Kokkos::ALL),
+                      Kokkos::subview(values, std::make_pair(std::size_t(first(c)), std::size_t(first(c + 1))), Kokkos::ALL));
+    at += count;
+  }
+  return rows;
+}
 
 void Membranes::make_room(const SurfaceSet& needed) {
   SurfaceSet& set = views_.surface;

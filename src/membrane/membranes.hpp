@@ -161,6 +161,12 @@ class Membranes {
   double volume_taken();
   void give_volume_back();
 
+  /// Those of this rank's own cells that are in `numbers`, at the present shape and size, by themselves: what is asked of a few takes no longer
+  /// the more there are beside them. Only with hold(). The normals and areas of their surfaces are not yet known.
+  std::unique_ptr<Membranes> only(const std::vector<int>& numbers) const;
+  /// Of `values` [vertex, 3] the rows of those cells, one after the other.
+  Components<double> rows_of(const std::vector<int>& numbers, const Components<double>& values) const;
+
   /// Fastest rate at which a membrane that moves with the fluid relaxes at the present shape, over those cells, 1/us; 0 without any.
   /// Normals and areas of the surfaces must be current. Takes as many operations as a cell has pairs of vertices.
   /// @param numbers  of the cells that stand for their types; those that other ranks have are passed over
@@ -238,6 +244,7 @@ class Membranes {
   std::vector<double> stiffness_;                // [cell] largest eigenvalue, nN/um; empty before the first estimate
   std::vector<double> rest_area_, rest_volume_;  // [cell]
   long calls_ = 0;                               // of advance
+  double size_ = 1;                              // of the cells at rest: see rest_at_size()
   double share_ahead_ = 0;                       // of the last velocities, in the present step's move
   bool resists_anew_ = false;
   bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()

@@ -1,5 +1,6 @@
 #include "output/report.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <filesystem>
@@ -92,7 +93,10 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
        {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
     if (!json["errors"].contains(name)) json["errors"][name] = nullptr;
   json["warnings"] = report.warnings;
-  json["told"] = warnings_told();
+  if (const WarningsTold* told = warnings_told()) {
+    json["told"] = told->texts;
+    if (told->more > 0) json["told"].push_back(fmt::format("{} more on the screen", told->more));
+  }
   json["quantities"] = report.quantities;
   if (!report.error_bars.empty()) json["error_bars"] = report.error_bars;
   const auto path = (std::filesystem::path(folder) / "report.json").string();

@@ -123,6 +123,23 @@ TEST_CASE("threads and ranks agree") {
 #endif
 }
 
+TEST_CASE("cells with cytosol that touch move the same on two threads") {
+  if (!host_threads) return;
+  const auto folder = fresh_folder("threads_of_cells");
+  const auto run = [&](const std::string& out, int threads) {
+    succeed(folder, with({"run", scene("two_cells"), "--out", out},
+                         {"grid.nodes=[17,17,17]", "cell_types.0.vertices=200", "cell_types.0.viscosity_ratio=5", "cell_types.0.membrane_viscosity_N_s_per_m=1e-7",
+                          "cells.0.center_um=[0.1,0.2,-1.3]", "cells.1.center_um=[0.1,0.2,1.3]", "fluid.momentum_tolerance=1e-12",
+                          "fluid.divergence_tolerance=1e-12", "time.step_us=5", "time.end_us=200", "output.every_us=0"}), {threads, 1});
+    return history(folder / out);
+  };
+  for (const auto& [column, difference] : differences(run("one", 1), run("two", 2))) {
+    INFO(column);
+    CHECK(difference < 1e-8);
+  }
+  CHECK(report(folder / "two")["contact"]["smallest_gap_um"] < 0.4);
+}
+
 #ifdef CORPUSCLE_HDF5
 
 // Twelve steps lie within the inlet's ramp, so boundary values change between the stored time levels.

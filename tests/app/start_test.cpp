@@ -118,6 +118,13 @@ TEST_CASE("scenes of membranes as forces that cannot be are refused with what he
   refused("blood_tube", {"grid.diameter_um=1"}, {"one cell has", "the whole grid", "larger grid"});
   refused("single_file", {"grid.nodes=[15,15,65]", "grid.diameter_um=4"}, {"not even one of its cells fits", "um across", "grid.diameter_um, now 4"});
   refused("cell_shear", {"cells.0.dissipation=full"}, {"cells.0.dissipation", "would not turn", "\"central\""});
+  const Words drawn{"cells.0.start_stretch = [2, 1, 1]", "area is 15 % off", "draw the cell out less"};
+  refused("relax", {"cells.0.start_stretch=[2,1,1]"}, drawn);
+#ifdef CORPUSCLE_MPI
+  fail(folder, with({"check", scene("relax")}, {"cells.0.start_stretch=[2,1,1]"}), 2, drawn, {1, 2});
+#endif
+  refused("straight_tube", {"grid.nodes=[17,17,25]", "cells.0.shape=sphere", "cells.0.radius_um=2", "cells.0.reference=shape", "cells.0.start_stretch=[0.8,0.8,2]"},
+          {"cells.0.start_stretch = [0.8, 0.8, 2]", "draw the cell out less"});
 }
 
 TEST_CASE("a gradient that nothing holds against is warned of") {
@@ -145,6 +152,11 @@ TEST_CASE("what is warned of before and during a run is in its report") {
   CHECK(of_ratio() == 1);
   succeed(folder, words);
   CHECK(of_ratio() == 0);
+  // The coarser runs of error bars tell of themselves alone.
+  auto bars = with(words, {"cell_types.0.viscosity_ratio=20", "time.end_us=8"});
+  bars.push_back("--estimate-error=spacing");
+  succeed(folder, bars);
+  CHECK(of_ratio() == 1);
 }
 
 TEST_CASE("warnings name the keys of types where cells have types") {

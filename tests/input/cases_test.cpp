@@ -218,6 +218,15 @@ TEST_CASE("keys that mean nothing in a scene are remarked upon") {
   only("cell_types.0.membrane_viscosity_N_s_per_m = 0.3", "cell_types.0.membrane_viscosity_N_s_per_m=0.3");
   only("cell_types.0.bending_modulus_J = 2.4e-12", "cell_types.0.bending_modulus_J=2.4e-12");
   only("fluid.density_pg_per_um3 = 1000", "fluid.density_pg_per_um3=1000");
+  only("fluid.pressure_gradient_Pa_per_um = 1e+06", "fluid.pressure_gradient_Pa_per_um=[-1e6, 0, 0]");
+  const Case pushed = read("two_cells.toml", {"cells.0.push_nN=[0, 0, 200]", "cells.1.push_nN=[0, 0, -200]"});
+  REQUIRE(pushed.remarks.size() == 2);
+  CHECK(pushed.remarks[0].rfind("cells.0.push_nN = 200 is far from what there is", 0) == 0);
+  // By default samples are ten steps, 200 us, apart.
+  const auto sampled = [&](const char* end) { return read("two_cells.toml", {"blood.bins=4", std::string("time.end_us=") + end}).remarks; };
+  REQUIRE(sampled("180").size() == 1);
+  CHECK(sampled("180")[0].rfind("blood.sample_every_us: unless it is set", 0) == 0);
+  CHECK(sampled("200").empty());
   only("fluid.kinematic_viscosity_um2_per_us = 1.1e-06", "fluid.kinematic_viscosity_um2_per_us=1.1e-6");
   for (const char* usual : {"capsule_shear.toml", "straight_tube.toml", "blood_tube.toml", "relax.toml", "stretch.toml"})
     CHECK(read(usual).remarks.empty());
