@@ -68,7 +68,7 @@ void BodyHistory::watch_cells(const std::vector<CellDiagnostics>& cells) {
     drifts_.volume = larger(drifts_.volume, std::abs(cells[c].volume_um3 / cells[c].rest_volume_um3 - 1));
     const int cell = static_cast<int>(c);
     // A capsule's sheet may grow; a red cell's bilayer may not, and what holds it says so.
-    if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
+    if (!membranes.holds_area(cell)) continue;
     const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
     if (area > drifts_.area) drifts_.widest = membranes.number(cell);
     drifts_.area = larger(drifts_.area, area);

@@ -15,6 +15,9 @@ void open_log(bool root, bool quiet = false);
 
 void log_info(const std::string& message);
 void log_warning(const std::string& message);
+/// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
+void log_error(const std::string& message, bool everywhere = false);
+
 /// What has been warned of so far, on the rank that speaks: the first hundred, and of how many more there is none of the texts.
 struct WarningsTold {
   std::vector<std::string> texts;
@@ -24,8 +27,6 @@ struct WarningsTold {
 const WarningsTold* warnings_told();
 /// For a run within a run. @return what has been warned of before
 WarningsTold exchange_warnings(WarningsTold told);
-/// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
-void log_error(const std::string& message, bool everywhere = false);
 
 template <class... Args>
 void info(fmt::format_string<Args...> format, Args&&... args) {

@@ -57,7 +57,7 @@ void refuse_stretched(const Comm& comm, const Case& scene, Membranes& membranes)
   for (std::size_t c = 0; c < cells.size() && wrong.empty(); ++c) {
     const int cell = static_cast<int>(c), number = membranes.number(cell);
     if (number >= static_cast<int>(scene.cells.size()) || !starts_drawn(scene.cells[number])) continue;
-    if (!std::holds_alternative<WlcPow>(membranes.law(cell)) && !membranes.holds_area(cell)) continue;
+    if (!membranes.holds_area(cell)) continue;
     const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
     if (area <= Membranes::senseless_area) continue;
     const Triple& stretch = scene.cells[number].start_stretch;

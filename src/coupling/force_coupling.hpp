@@ -114,6 +114,7 @@ class ForceCoupling : public Coupling {
     double narrowest = 1e30, widest = 0;   // um
     std::vector<std::vector<int>> numbers;  // [kind] of the cells that stand for it
   };
+  std::vector<std::pair<double, double>> mean_spacings();
   Spacings spacings_of_cells();
   static std::map<int, Kind> farthest(const std::map<int, Kind>& drawn_out);
   Kind kind_of(const CellRecord& cell) const;

@@ -92,11 +92,9 @@ ForceCoupling::Kind ForceCoupling::kind_of(const CellRecord& cell) const {
   return found == drawn_out_.end() ? Kind{cell.type, {1, 1, 1}} : found->second;
 }
 
-/// Of a cell the grid's spacings count as what they are over its vertices in the mean: the narrowest that a cell of a tube reaches have too little
-/// say to be waited for, but where all of them are narrow, as inside a bend, that cell is. Slip grows with the spacing: of each kind the first
-/// cell, that in the narrowest and that in the widest spacings stand for all, the same ones on any number of ranks.
-ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
-  constexpr double rounding = 1e-9, none = std::numeric_limits<int>::max();
+/// Of each of this rank's cells the least and the largest of what the grid's spacings along a direction, um, are over its vertices in the mean: the
+/// narrowest that a cell of a tube reaches have too little say to be waited for, but where all of them are narrow, as inside a bend, that cell is.
+std::vector<std::pair<double, double>> ForceCoupling::mean_spacings() {
   const Components<double> spacings("corpuscle::coupling::spacings", surfaces().vertices, 3);
   spacings_at(transfer_->block(), transfer_->views(), spacings);
   cells_->add_copies(spacings);
@@ -111,6 +109,15 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
       const double mean = sum / (first(c + 1) - first(c));
       of_cell[c] = {std::min(of_cell[c].first, mean), std::max(of_cell[c].second, mean)};
     }
+  return of_cell;
+}
+
+/// Slip grows with the spacing: of each kind the first cell, that in the narrowest and that in the widest spacings stand for all, the same ones on
+/// any number of ranks.
+ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
+  constexpr double rounding = 1e-9, none = std::numeric_limits<int>::max();
+  const auto& own = cells_->own();
+  const auto of_cell = mean_spacings();
   const Comm& comm = fluid_.grid().comm();
   std::set<Kind> kinds;
   for (std::size_t t = 0; t < membranes_->types().size(); ++t) kinds.insert({static_cast<int>(t), {1, 1, 1}});

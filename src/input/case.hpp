@@ -212,6 +212,7 @@ struct BloodSettings {
     constexpr double seldom = 10;  // steps: neighbouring ones tell the same, and a sample costs some hundredths of a step
     return sample_every_us > 0 ? std::max(sample_every_us, step_us) : seldom * step_us;
   }
+
   bool operator==(const BloodSettings&) const = default;
 };
 

@@ -104,7 +104,7 @@ void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
     rest_area_.push_back(type.law.rest_area);
     rest_volume_.push_back(type.law.rest_volume);
     number_.push_back(cells[c].number);
-    holds_area_.push_back(type.law.area > 0);
+    holds_area_.push_back(type.law.area > 0 || std::visit([](const auto& law) { return law.holds_area; }, type.in_plane));
   }
 }
 

@@ -1,7 +1,6 @@
 // All cells' membranes: forces, motion, diagnostics, state.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>

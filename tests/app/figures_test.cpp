@@ -131,7 +131,7 @@ TEST_CASE("a cell in a flow that comes to rest is measured along one axis") {
   const auto samples = history(folder / "out");
   REQUIRE(samples.lines.size() > 15);
   for (std::size_t n = 1; n < samples.lines.size(); ++n)
-    CHECK(std::abs(samples.number(n, "length_um") - samples.number(n - 1, "length_um")) < 0.5);
+    CHECK(std::abs(samples.number(n, "length_um") - samples.number(n - 1, "length_um")) < 0.5);  // 0.1 at most, and 3.4 across
 }
 
 TEST_CASE("a cell is at the outflow when it is, whatever the speed that shear modulus over viscosity is") {

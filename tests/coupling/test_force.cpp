@@ -278,7 +278,7 @@ TEST_CASE("the longest step is that of the stiffest kind of cell, in whatever or
     const double one = longest({a}), other = longest({b}), both = longest({a, b});
     INFO(one << ", " << other << " us, together " << both);
     CHECK(std::abs(one / other - 1) > 0.1);
-    CHECK(both == Approx(std::min(one, other)).epsilon(0.03));
+    CHECK(both == Approx(std::min(one, other)).epsilon(0.03));  // with viscosity it goes by the softest deformation of all cells
     CHECK(longest({b, a}) == Approx(both).epsilon(0.006));  // of three digits
   }
 }
