@@ -78,39 +78,58 @@ inline void factorise_band(const BandSystem& band) {
       });
 }
 
+/// The lanes of a team of one thread.
+struct TeamLanes {
+  const Kokkos::TeamPolicy<Exec>::member_type& team;
+
+  template <class Body>
+  KOKKOS_INLINE_FUNCTION void run(int n, const Body& body) const {
+    Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, n), body);
+  }
+  KOKKOS_INLINE_FUNCTION void wait() const { team.team_barrier(); }
+};
+
+/// Those of the processor that calls.
+struct OwnLanes {
+  template <class Body>
+  void run(int n, const Body& body) const {
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
+    for (int i = 0; i < n; ++i) body(i);
+  }
+  void wait() const {}
+};
+
 /// Both sweeps through the factors, and what is between them, over y, [row] and `width` more on either side that are zero. They
-/// add multiples of columns: their order is fixed, so the answer is the same on any number of threads and lanes.
-KOKKOS_INLINE_FUNCTION void sweep_band(const Kokkos::TeamPolicy<Exec>::member_type& team, const BandSystem& a, double* y) {
+/// add multiples of columns: their order is fixed, so the answer is the same on any number of lanes.
+template <class Lanes>
+KOKKOS_INLINE_FUNCTION void sweep_band(const Lanes& lanes, const BandSystem& a, double* y) {
   for (int j = 0; j < a.rows; ++j) {
     const double known = y[j];
     const double* column = &a.lower(j, 1);
     double* next = y + j + 1;
-    Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { next[d] -= known * column[d]; });
-    team.team_barrier();
+    lanes.run(a.width, [&](int d) { next[d] -= known * column[d]; });
+    lanes.wait();
   }
-  Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] *= a.inverse(r); });
-  team.team_barrier();
+  lanes.run(a.rows, [&](int r) { y[r] *= a.inverse(r); });
+  lanes.wait();
   for (int j = a.rows - 1; j > 0; --j) {
     const double known = y[j];
     const double* row = &a.upper(j, 1);
     double* before = y + j - 1;
-    Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) { before[-d] -= known * row[d]; });
-    team.team_barrier();
+    lanes.run(a.width, [&](int d) { before[-d] -= known * row[d]; });
+    lanes.wait();
   }
 }
 
-/// x = the solution for b, both [cell] of the level.
-inline void solve_band(const BandSystem& band, const Array<CycleReal>& b, const Array<CycleReal>& x) {
-  using Team = Kokkos::TeamPolicy<Exec>;
-  const BandSystem a = band;
-  Kokkos::parallel_for(
-      "corpuscle::multigrid::solve_band", Team(1, 1, band_lanes), KOKKOS_LAMBDA(const Team::member_type& team) {
-        double* y = &a.x(a.width);
-        Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] = b(a.cell(r)); });
-        team.team_barrier();
-        sweep_band(team, a, y);
-        Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { x(a.cell(r)) = y[r]; });
-      });
+/// x = the solution for b, both [cell] of the level, by a processor.
+template <class Lanes>
+void solve_band(const Lanes& lanes, const BandSystem& a, const Array<CycleReal>& b, const Array<CycleReal>& x) {
+  double* y = &a.x(a.width);
+  lanes.run(a.rows, [&](int r) { y[r] = b(a.cell(r)); });
+  sweep_band(lanes, a, y);
+  lanes.run(a.rows, [&](int r) { x(a.cell(r)) = y[r]; });
 }
 
 /// The inverse of a factorised system, [row, width + row], with `width` zeros on either side of each row: as many sweeps as
@@ -124,24 +143,16 @@ inline void invert_band(const BandSystem& band, const Table<double>& inverse) {
         double* y = &inverse(row, a.width);
         Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.rows), [&](int r) { y[r] = r == row ? 1 : 0; });
         team.team_barrier();
-        sweep_band(team, a, y);
+        sweep_band(TeamLanes{team}, a, y);
       });
 }
 
-/// x = the inverse times b, both [cell] of the level.
-inline void apply_inverse(const BandSystem& band, const Table<double>& inverse, const Array<CycleReal>& b,
-                          const Array<CycleReal>& x) {
-  using Team = Kokkos::TeamPolicy<Exec>;
-  const BandSystem a = band;
-  Kokkos::parallel_for(
-      "corpuscle::multigrid::apply_inverse", Team(a.rows, 1, band_lanes), KOKKOS_LAMBDA(const Team::member_type& team) {
-        const int row = team.league_rank();
-        double sum = 0;
-        Kokkos::parallel_reduce(
-            Kokkos::ThreadVectorRange(team, a.rows), [&](int r, double& part) { part += inverse(row, a.width + r) * b(a.cell(r)); },
-            sum);
-        Kokkos::single(Kokkos::PerThread(team), [&]() { x(a.cell(row)) = sum; });
-      });
+/// The row of x = the inverse times b, both [cell] of the level. The inverse is symmetric: threads with rows side by side read side by side.
+KOKKOS_INLINE_FUNCTION void apply_inverse(const BandSystem& a, const Table<double>& inverse, const Array<CycleReal>& b,
+                                          const Array<CycleReal>& x, int row) {
+  double sum = 0;
+  for (int r = 0; r < a.rows; ++r) sum += inverse(r, a.width + row) * b(a.cell(r));
+  x(a.cell(row)) = sum;
 }
 
 }  // namespace corpuscle

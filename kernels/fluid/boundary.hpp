@@ -34,12 +34,20 @@ void fill_symmetry(const IndexSpace& index, const CellBox& side, const CellBox& 
   });
 }
 
-/// Velocity given: zero (`homogeneous`, for the linear operator alone) or the values in `given`.
+/// Boundary nodes whose velocity is given, and whether it is zero.
+struct GivenBoxes {
+  CellBoxes boxes;
+  bool zero[CellBoxes::most] = {};
+};
+
+/// Velocity given: zero where it always is, or everywhere (`homogeneous`, for the linear operator alone), else the values in `given`.
 template <class Velocity>
-void fill_given(const IndexSpace& index, const CellBox& side, const Components<double>& given, const Velocity& u) {
-  for_box("corpuscle::fluid::given_velocity", side.lower, side.upper, KOKKOS_LAMBDA(int i, int j, int k) {
+void fill_given(const IndexSpace& index, const GivenBoxes& sides, bool homogeneous, const Components<double>& given, const Velocity& u) {
+  GivenBoxes in = sides;
+  for (bool& zero : in.zero) zero = zero || homogeneous;
+  for_boxes("corpuscle::fluid::given_velocity", in.boxes, KOKKOS_LAMBDA(int b, int i, int j, int k) {
     const int c = index.cell(i, j, k);
-    store(u, c, load(given, c));
+    store(u, c, in.zero[b] ? Vec3{} : load(given, c));
   });
 }
 

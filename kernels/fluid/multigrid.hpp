@@ -126,20 +126,30 @@ inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLeve
   }
 }
 
-/// coarse_values = sums over the joined cells, in this rank's part of the coarser level. Without branches, so that it vectorises: what is not joined is read (it is
-/// never beyond the halo) and counts nothing.
+// What a cycle does to one cell.
+
+/// coarse = sums over the joined cells, for a cell of this rank's part of the coarser level. Without branches, so that it vectorises: what is
+/// not joined is read (it is never beyond the halo) and counts nothing.
 template <class Field>
-void restrict_sums(const MultigridLevel& fine, const IndexSpace& coarse, const Field& values, const Field& coarse_values) {
-  const IndexSpace index = fine.index;
-  const int s1 = index.stride(1), s2 = index.stride(2);
-  for_owned(cycle_label<Field>("restrict"), fine.part, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1],
-                             fine.factor[2] * k + fine.shift[2]);
+struct RestrictSums {
+  MultigridLevel fine;
+  IndexSpace coarse;
+  Field values, coarse_values;
+
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
+    const int s1 = fine.index.stride(1), s2 = fine.index.stride(2);
+    const int c = fine.index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1],
+                                  fine.factor[2] * k + fine.shift[2]);
     const CycleReal w0 = children(fine, 0, i) - 1, w1 = children(fine, 1, j) - 1, w2 = children(fine, 2, k) - 1;
     const auto pair = [&](int at) { return value_at(values, at) + w0 * value_at(values, at + 1); };
     set_value(coarse_values, coarse.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2]),
               pair(c) + w1 * pair(c + s1) + w2 * (pair(c + s2) + w1 * pair(c + s1 + s2)));
-  });
+  }
+};
+
+template <class Field>
+void restrict_sums(const MultigridLevel& fine, const IndexSpace& coarse, const Field& values, const Field& coarse_values) {
+  for_owned(cycle_label<Field>("restrict"), fine.part, RestrictSums<Field>{fine, coarse, values, coarse_values});
 }
 
 /// diagonal = own + the conductances of a cell's faces.
@@ -184,21 +194,25 @@ inline double sum_conductances(const MultigridLevel& level, int d) {
                    KOKKOS_LAMBDA(int i, int j, int k) { return g(index.cell(i, j, k)); });
 }
 
-// The kernels of the cycle also run for halo cells behind each line (for_owned_rounded): beyond a physical side inverse is
-// zero, which leaves their x at zero; beyond another rank's side x is exchanged before it is read.
+// What follows also runs for halo cells behind each line (for_owned_rounded): beyond a physical side inverse is zero, which leaves
+// their x at zero; beyond another rank's side x is exchanged before it is read.
 
 /// previous, x = the first and the second Chebyshev iterate from zero.
 template <class Field>
-void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& first,
-                      const ChebyshevSteps::Step& second, const Field& b, const Field& previous, const Field& x) {
-  const IndexSpace index = level.index;
-  const double w0 = first.weight, w1 = second.weight, m1 = second.momentum;
-  const CycleReal of_first = w0, of_others = w1 * w0, of_own = w0 + m1 * w0 + w1 - w1 * w0;
-  const auto inverse = level.inverse;
-  const auto g0 = level.conductance[0], g1 = level.conductance[1], g2 = level.conductance[2];
-  const int s1 = index.stride(1), s2 = index.stride(2);
-  for_owned_rounded(cycle_label<Field>("smooth_from_zero"), index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
+struct SmoothFromZero {
+  LevelOperator<CycleReal> level;
+  CycleReal of_first, of_others, of_own;
+  Field b, previous, x;
+
+  KOKKOS_INLINE_FUNCTION SmoothFromZero(const LevelOperator<CycleReal>& a, const ChebyshevSteps::Step& first,
+                                        const ChebyshevSteps::Step& second, const Field& right, const Field& before, const Field& result)
+      : level(a), b(right), previous(before), x(result) {
+    const double w0 = first.weight, w1 = second.weight, m1 = second.momentum;
+    of_first = w0, of_others = w1 * w0, of_own = w0 + m1 * w0 + w1 - w1 * w0;
+  }
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
+    const int s1 = level.index.stride(1), s2 = level.index.stride(2), c = level.index.cell(i, j, k);
+    const auto &inverse = level.inverse, &g0 = level.conductance[0], &g1 = level.conductance[1], &g2 = level.conductance[2];
     const auto scaled = inverse(c) * value_at(b, c);
     const auto around = g0(c) * inverse(c - 1) * value_at(b, c - 1) + g0(c + 1) * inverse(c + 1) * value_at(b, c + 1) +
                         g1(c) * inverse(c - s1) * value_at(b, c - s1) + g1(c + s1) * inverse(c + s1) * value_at(b, c + s1) +
@@ -206,49 +220,62 @@ void smooth_from_zero(const MultigridLevel& level, const ChebyshevSteps::Step& f
     set_value(previous, c, of_first * scaled);
     // D^-1 A x1 = w0 (scaled - inverse * around), since D^-1 D = 1 where there is an unknown and scaled = 0 elsewhere
     set_value(x, c, of_own * scaled + of_others * inverse(c) * around);
-  });
-}
+  }
+};
 
 /// previous = x + momentum (x - previous) + weight D^-1 (b - A x): the next iterate takes the place of the one before.
 template <class Field>
-void smooth(const MultigridLevel& level, const ChebyshevSteps::Step& step, const Field& b, const Field& x,
-            const Field& previous) {
-  const IndexSpace index = level.index;
-  const CycleReal momentum = step.momentum, weight = step.weight;
-  for_owned_rounded(cycle_label<Field>("smooth"), index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
+struct Smooth {
+  LevelOperator<CycleReal> level;
+  CycleReal momentum, weight;
+  Field b, x, previous;
+
+  KOKKOS_INLINE_FUNCTION Smooth(const LevelOperator<CycleReal>& a, const ChebyshevSteps::Step& step, const Field& right, const Field& now,
+                                const Field& before)
+      : level(a), momentum(step.momentum), weight(step.weight), b(right), x(now), previous(before) {}
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
+    const int c = level.index.cell(i, j, k);
     const auto here = value_at(x, c);
     set_value(previous, c, here + momentum * (here - value_at(previous, c)) +
                                weight * level.inverse(c) * (value_at(b, c) - level.apply(x, c)));
-  });
-}
+  }
+};
 
 /// residual = b - A x where there is an unknown, zero elsewhere.
 template <class Field>
-void level_residual(const MultigridLevel& level, const Field& b, const Field& x, const Field& residual) {
-  const IndexSpace index = level.index;
-  for_owned_rounded(cycle_label<Field>("residual"), index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
+struct LevelResidual {
+  LevelOperator<CycleReal> level;
+  Field b, x, residual;
+
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
+    const int c = level.index.cell(i, j, k);
     const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
     set_value(residual, c, unknown * (value_at(b, c) - level.apply(x, c)));
-  });
-}
+  }
+};
 
 /// x += what the coarse level found, the same for all cells joined in one.
 template <class Field>
-void add_correction(const MultigridLevel& level, const IndexSpace& coarse, const Field& correction, const Field& x) {
-  const IndexSpace index = level.index;
+struct AddCorrection {
+  IndexSpace index, coarse;
+  Array<CycleReal> inverse;
   // Factors are 1 or 2: shifts of bits for divisions, which would keep the loop from vectorising.
-  const int b0 = level.factor[0] - 1, b1 = level.factor[1] - 1, b2 = level.factor[2] - 1;
-  const int o0 = level.factor[0] - level.shift[0], o1 = level.factor[1] - level.shift[1], o2 = level.factor[2] - level.shift[2];
-  const int t0 = level.begin[0] - 1, t1 = level.begin[1] - 1, t2 = level.begin[2] - 1;
-  for_owned_rounded(cycle_label<Field>("prolong"), index, KOKKOS_LAMBDA(int i, int j, int k) {
+  int b0, b1, b2, o0, o1, o2, t0, t1, t2;
+  Field correction, x;
+
+  KOKKOS_INLINE_FUNCTION AddCorrection(const MultigridLevel& level, const IndexSpace& coarser, const Field& found, const Field& result)
+      : index(level.index), coarse(coarser), inverse(level.inverse), correction(found), x(result) {
+    b0 = level.factor[0] - 1, b1 = level.factor[1] - 1, b2 = level.factor[2] - 1;
+    o0 = level.factor[0] - level.shift[0], o1 = level.factor[1] - level.shift[1], o2 = level.factor[2] - level.shift[2];
+    t0 = level.begin[0] - 1, t1 = level.begin[1] - 1, t2 = level.begin[2] - 1;
+  }
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
     const int c = index.cell(i, j, k);
     const int from = coarse.cell(((i + o0) >> b0) + t0, ((j + o1) >> b1) + t1, ((k + o2) >> b2) + t2);
-    const CycleReal unknown = level.inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
+    const CycleReal unknown = inverse(c) > 0 ? CycleReal(1) : CycleReal(0);
     set_value(x, c, value_at(x, c) + unknown * value_at(correction, from));
-  });
-}
+  }
+};
 
 inline void compact_scalar(const IndexSpace& index, const Array<CycleReal>& field, const Array<double>& vector) {
   for_owned("corpuscle::multigrid::to_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {

@@ -3,19 +3,7 @@
 
 #include "grid/index_space.hpp"
 
-#include <array>
-
 namespace corpuscle {
-
-/// A box of cells lower <= (i, j, k) < upper.
-struct CellBox {
-  std::array<int, 3> lower{}, upper{};
-  int size() const {
-    int n = 1;
-    for (int d = 0; d < 3; ++d) n *= upper[d] > lower[d] ? upper[d] - lower[d] : 0;
-    return n;
-  }
-};
 
 /// The values of one cell, to or from a buffer with `size` entries a component. (Functions of their own: a device
 /// lambda must not capture anything first inside an `if constexpr`.)
@@ -67,13 +55,17 @@ void unpack_box(const IndexSpace& index, const CellBox& box, const Buffer& buffe
   });
 }
 
-/// field over `target` = field over the box shifted by `shift` cells along direction `d`; the boxes do not overlap.
+/// Where a coordinate of a halo cell comes from around a period of n cells.
+KOKKOS_FORCEINLINE_FUNCTION int around_period(int at, int n) { return at < 0 ? at + n : (at >= n ? at - n : at); }
+
+/// field over `targets`, halo cells, = field at the other ends of the periods along the directions `wraps`.
 template <class Field>
-void copy_shifted(const IndexSpace& index, const CellBox& target, int d, int shift, const Field& field) {
-  const int offset = shift * index.stride(d);
-  for_box("corpuscle::halo::periodic", target.lower, target.upper, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    copy_cell(field, c + offset, c);
+void copy_around_periods(const IndexSpace& index, const CellBoxes& targets, const std::array<bool, 3>& wraps, const Field& field) {
+  const bool w0 = wraps[0], w1 = wraps[1], w2 = wraps[2];
+  for_boxes("corpuscle::halo::periodic", targets, KOKKOS_LAMBDA(int, int i, int j, int k) {
+    const int from = index.cell(w0 ? around_period(i, index.n[0]) : i, w1 ? around_period(j, index.n[1]) : j,
+                                w2 ? around_period(k, index.n[2]) : k);
+    copy_cell(field, from, index.cell(i, j, k));
   });
 }
 

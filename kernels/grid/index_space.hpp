@@ -58,6 +58,45 @@ enum class NodeKind : std::int8_t {
   none = 4       // void layers
 };
 
+/// A box of cells lower <= (i, j, k) < upper.
+struct CellBox {
+  std::array<int, 3> lower{}, upper{};
+  int size() const {
+    int n = 1;
+    for (int d = 0; d < 3; ++d) n *= upper[d] > lower[d] ? upper[d] - lower[d] : 0;
+    return n;
+  }
+};
+
+/// Boxes that have no cell in common, as plain numbers.
+struct CellBoxes {
+  static constexpr int most = 6;
+  int count = 0;
+  int lower[most][3], wide[most][3];
+  int end[most];  // cells of the boxes so far
+
+  void add(const CellBox& box) {
+    if (box.size() == 0) return;
+    for (int d = 0; d < 3; ++d) lower[count][d] = box.lower[d], wide[count][d] = box.upper[d] - box.lower[d];
+    end[count] = size() + box.size();
+    ++count;
+  }
+  int size() const { return count > 0 ? end[count - 1] : 0; }
+  CellBox box(int b) const {
+    CellBox box;
+    for (int d = 0; d < 3; ++d) box.lower[d] = lower[b][d], box.upper[d] = lower[b][d] + wide[b][d];
+    return box;
+  }
+  /// visit(b, i, j, k) for the cell that comes e-th in the order of the boxes.
+  template <class Visit>
+  KOKKOS_FORCEINLINE_FUNCTION void visit(int e, const Visit& visit) const {
+    int b = 0;
+    while (e >= end[b]) ++b;
+    const int at = b > 0 ? e - end[b - 1] : e;
+    visit(b, lower[b][0] + at % wide[b][0], lower[b][1] + at / wide[b][0] % wide[b][1], lower[b][2] + at / (wide[b][0] * wide[b][1]));
+  }
+};
+
 // A loop over cells vectorises only if all that it calls is inlined.
 #if defined(__GNUC__)
 #define CORPUSCLE_INLINE_ALL __attribute__((flatten))
@@ -146,6 +185,29 @@ void for_box(const std::string& label, const std::array<int, 3>& lower, const st
   const int threads = Exec().concurrency();
   const auto share = [=](int thread) CORPUSCLE_INLINE_ALL { run_lines(lower, upper, thread, threads, body); };
   const double cells = static_cast<double>(upper[0] - lower[0]) * (upper[1] - lower[1]) * (upper[2] - lower[2]);
+  if (cells < worth_threads)
+    Kokkos::parallel_for(label, Kokkos::RangePolicy<CallingThread>(0, threads), share);
+  else
+    Kokkos::parallel_for(label, Policy(0, threads), share);
+#endif
+}
+
+/// Run `body(b, i, j, k)` for every cell of boxes b, in one launch.
+template <class Body>
+void for_boxes(const std::string& label, const CellBoxes& boxes, const Body& body) {
+  const int cells = boxes.size();
+  if (cells == 0) return;
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  const CellBoxes in = boxes;
+  Kokkos::parallel_for(label, Policy(0, cells), KOKKOS_LAMBDA(int e) { in.visit(e, body); });
+#else
+  const int threads = Exec().concurrency();
+  const auto share = [=](int thread) CORPUSCLE_INLINE_ALL {
+    for (int b = 0; b < boxes.count; ++b) {
+      const CellBox box = boxes.box(b);
+      run_lines(box.lower, box.upper, thread, threads, [=](int i, int j, int k) CORPUSCLE_INLINE_ALL { body(b, i, j, k); });
+    }
+  };
   if (cells < worth_threads)
     Kokkos::parallel_for(label, Kokkos::RangePolicy<CallingThread>(0, threads), share);
   else

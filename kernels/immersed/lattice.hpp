@@ -105,6 +105,33 @@ struct Lattice {
     return Located::failed;
   }
 
+  /// Newton's method from the middle of the cell of `q` in its own map. @returns the last step, cells; negative where the map is singular
+  KOKKOS_INLINE_FUNCTION double solve_in_cell(const Vec3& p, LatticePoint& q) const {
+    double last = 0;
+    for (int d = 0; d < 3; ++d) q.f[d] = 0.5;
+    for (int iteration = 0; iteration < 12; ++iteration) {
+      double step[3];
+      if (!newton_step(p, q, step)) return -1;
+      for (int d = 0; d < 3; ++d) q.f[d] += step[d];
+      last = std::fabs(step[0]) + std::fabs(step[1]) + std::fabs(step[2]);
+      if (last < 1e-13) break;
+    }
+    return last;
+  }
+
+  /// What locate() and polish() give where `p` is well within the cell of `q`, as it nearly always is in that where it was before.
+  /// @returns false, and `q` as it was, where it is not
+  KOKKOS_INLINE_FUNCTION bool find_in_cell(const Vec3& p, LatticePoint& q) const {
+    constexpr double margin = 1e-6, converged = 1e-9;
+    LatticePoint s = q;
+    const double last = solve_in_cell(p, s);
+    if (!(last >= 0 && last < converged)) return false;
+    for (int d = 0; d < 3; ++d)
+      if (!(s.f[d] > margin && s.f[d] < 1 - margin)) return false;
+    q = s;
+    return true;
+  }
+
   /// Same bits on every rank that holds the lattice cell of `q`, whatever the start of the search was: a point on a face
   /// between two cells, which a search may end in either of, belongs to the upper one.
   KOKKOS_INLINE_FUNCTION void polish(const Vec3& p, LatticePoint& q) const {
@@ -116,13 +143,7 @@ struct Lattice {
       q.f[d] -= up;
     }
     LatticePoint s = q;
-    for (int d = 0; d < 3; ++d) s.f[d] = 0.5;
-    for (int iteration = 0; iteration < 12; ++iteration) {
-      double step[3];
-      if (!newton_step(p, s, step)) return;
-      for (int d = 0; d < 3; ++d) s.f[d] += step[d];
-      if (std::fabs(step[0]) + std::fabs(step[1]) + std::fabs(step[2]) < 1e-13) break;
-    }
+    if (solve_in_cell(p, s) < 0) return;
     if (std::fabs(s.f[0] - q.f[0]) + std::fabs(s.f[1] - q.f[1]) + std::fabs(s.f[2] - q.f[2]) < 1e-6) q = s;
   }
 

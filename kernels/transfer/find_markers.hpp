@@ -61,6 +61,7 @@ KOKKOS_INLINE_FUNCTION bool at_sides(const Lattice& lattice, const LatticePoint&
 /// @returns false if it is not to be found
 KOKKOS_INLINE_FUNCTION bool locate_vertex(const MarkerSearch& s, const Vec3& p, bool guessed, LatticePoint& q) {
   constexpr int most = 3;
+  if (guessed && s.lattice.find_in_cell(p, q)) return true;
   if (guessed && s.lattice.locate(p, q) == Located::inside) {
     s.lattice.polish(p, q);
     return true;

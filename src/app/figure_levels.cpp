@@ -55,8 +55,8 @@ constexpr FigureLevel levels[] = {
     {"volume_drift", 1e-4, false, Of::flow, "time.step_us", "a cell has lost or gained volume: reduce time.step_us"},
     // Evans, Waugh and Melnik, Biophys. J. 16, 1976.
     {"area_drift", 0.04, false, Of::itself, "cells.0.area_modulus_uN_per_m",
-     "a real membrane breaks at about 4 % of area, so this load is beyond the model, or what a step (time.step_us) brings is more than membranes follow: compare "
-     "with a shorter one, reduce the flow or force, widen the channel, or check cells.0.area_modulus_uN_per_m"},
+     "a real membrane breaks at about 4 % of area, so this load (or how far a cell starts drawn out, start_stretch) is beyond the model, or what a "
+     "step (time.step_us) brings is more than membranes follow: compare with a shorter one, reduce the flow or force, widen the channel, or check cells.0.area_modulus_uN_per_m"},
     // 0.03 in the tube. Above, most of a membrane's velocity is new in each step: it swings.
     {"coupling_residual", 0.5, false, Of::speed, "time.step_us",
      "the velocity of the membrane changes by that share of itself in a step, on average: leave out or lower "

@@ -187,7 +187,7 @@ void print_schedule(const StepSchedule& schedule) {
 
 Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const Place& place) {
   const auto start = Clock::now();
-  Timers timers;
+  Timers timers(options.profile);
   StopSignal signal(comm);
   auto packed = packed_before(comm, scene, options.restart, place);
   FlowSimulation simulation(comm, scene, timers, packed.get());

@@ -135,6 +135,7 @@ Command parse(CLI::App& app, int argc, char** argv) {
   run->add_flag("--overwrite", options.overwrite, "remove the results that the folder of --out holds");
   run->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
   run->add_option("--restart", options.restart, "checkpoint.h5 to continue from, or the folder that holds it");
+  run->add_flag("--profile", options.profile, "wait for the device after each part of a step, so that the report's times of parts are theirs");
   run->add_flag("--estimate-error{all}", options.estimate,
                 "error bars from further, coarser runs: spacing, step, vertices (comma-separated), or all");
   run->footer(ends);

@@ -17,6 +17,7 @@ struct RunOptions {
   bool overwrite = false;              // results that the folder holds
   std::vector<std::string> overrides;  // section.key=value
   std::string restart;                 // checkpoint to continue from, or its folder; empty: from the start
+  bool profile = false;                // wait for the device at the end of each part that is timed
   std::string estimate;                // coarser runs for error bars (error_estimate.hpp); empty: none
 };
 

@@ -178,8 +178,9 @@ double passing_speed(const BoundarySettings& a, const BoundarySettings& opposite
 
 }  // namespace
 
-std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettings>& boundaries, double step_us) {
-  constexpr double much = 0.5, most = 2;
+std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettings>& boundaries, double step_us, bool viscous) {
+  constexpr double most = 2;
+  const double much = viscous ? 0.1 : 0.5;
   const auto moves = [](const BoundarySettings& s) { return s.type == Type::moving_wall; };
   if (std::none_of(boundaries.begin(), boundaries.end(), moves)) return "";
   const auto sides = measure_sides(grid, boundaries);
@@ -200,10 +201,11 @@ std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettin
   const Triple& v = *boundaries[wall].velocity;
   const std::string text = fmt::format(
       "boundary.{}.velocity_mm_per_s = [{:.4g}, {:.4g}, {:.4g}]: {} moves past the opposite side, {:.3g} um away, with {:.4g} mm/s, which "
-      "strains the fluid and the cells in it by {:.3g} in a step of {:g} us; {:g} is the most that a cell follows well, more than {:g} "
+      "strains the fluid and the cells in it by {:.3g} in a step of {:g} us; {:g} is the most that a cell{} follows well, more than {:g} "
       "is refused: lower boundary.{}.velocity_mm_per_s (is it in mm/s?), or reduce time.step_us to {:.2g} us or less",
       wall, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[wall].side), apart,
-      speed / units::mm_per_s, worst, step_us, much, most, wall, 0.98 * step_us * much / worst);
+      speed / units::mm_per_s, worst, step_us, much,
+      viscous ? " whose membrane is viscous" : "", most, wall, 0.98 * step_us * much / worst);
   if (worst > most) throw InputError(text);
   return text;
 }

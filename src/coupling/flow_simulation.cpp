@@ -50,6 +50,15 @@ void warn_of_free_fluid(const Case& scene) {
 
 /// @throws InputError  for cells drawn out so far that the first step would find their area senseless
 void refuse_stretched(const Comm& comm, const Case& scene, Membranes& membranes) {
+  constexpr double unlike = 0.02;
+  for (std::size_t c = 0; c < scene.cells.size(); ++c) {
+    const Triple& s = scene.cells[c].start_stretch;
+    const double size = std::cbrt(s[0] * s[1] * s[2]);
+    if (std::abs(size - 1) > unlike)
+      warn("cells.{}.start_stretch = [{:g}, {:g}, {:g}] is taken as [{:.3g}, {:.3g}, {:.3g}]: a cell that starts drawn out keeps its volume, so "
+           "only the ratios count (another size: scale)",
+           c, s[0], s[1], s[2], s[0] / size, s[1] / size, s[2] / size);
+  }
   const auto starts_drawn = [](const CellSettings& cell) { return cell.start_stretch != Triple{1, 1, 1}; };
   if (std::none_of(scene.cells.begin(), scene.cells.end(), starts_drawn)) return;
   std::string wrong;
@@ -83,8 +92,10 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   fluid_ = std::make_unique<FluidSolver>(*grid_, fluid_settings(scene), scene.boundaries, &*scene.grid, &timers_);
   if (scene.has_cells() || !scene.bodies.empty()) coupling_ = make_coupling(scene, schedule_, *fluid_, timers_, packed);
   // After the coupling, which refuses what its membranes do not stand: that is the shorter step, and another remedy.
-  if (scene.has_cells())
-    if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back()); !text.empty()) warn("{}", text);
+  if (scene.has_cells()) {
+    const bool viscous = coupling_->shared_cells() && membranes()->viscosity();
+    if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back(), viscous); !text.empty()) warn("{}", text);
+  }
   if (!membranes()) return;
   refuse_stretched(comm, scene, *membranes());
   membranes()->limit_area(Membranes::senseless_area);

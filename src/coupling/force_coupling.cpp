@@ -182,12 +182,15 @@ void ForceCoupling::check_start() {
   find_softest();
   measure_stability();
   if (loads_) loads_->look_at_start(lengths_us_.front());
-  drawn_out_.clear();
   warn_of_ratios();
-  if (small_) return membranes_->rest_at_size(1);
-  warn_of_walls();
-  warn_of_pressed_start();
-  refuse_long_steps();
+  if (!small_) {
+    warn_of_walls();
+    warn_of_pressed_start();
+    refuse_long_steps();
+  } else {
+    membranes_->rest_at_size(1);
+  }
+  drawn_out_.clear();
 }
 
 StepStatistics ForceCoupling::advance(double time, double dt) {

@@ -1,6 +1,7 @@
 // coupling.scheme = "force": membranes are forces in a fluid that is everywhere but in rigid bodies, and move with it.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -118,9 +119,11 @@ class ForceCoupling : public Coupling {
   Spacings spacings_of_cells();
   static std::map<int, Kind> farthest(const std::map<int, Kind>& drawn_out);
   Kind kind_of(const CellRecord& cell) const;
-  void measure_stability();
+  void measure_stability() { measure_stability(*std::max_element(lengths_us_.begin(), lengths_us_.end())); }
+  void measure_stability(double longest_us);
   void anticipate_short_waves(const MobilityModel& model, const std::vector<int>& numbers, Membranes& standing);
-  void refuse_long_steps() const;
+  void refuse_long_steps();
+  static std::string rounded_down(double value);
   double next_step_us(double time_us, double dt_us) const;
 
   Case scene_;
@@ -155,6 +158,7 @@ class ForceCoupling : public Coupling {
     double area = 0, radius = 0, wave_number_square = 0;
   } softest_;
   double stable_us_ = 0;      // largest stable step at the start
+  std::string least_stable_;  // which cell, with what it has from the start
   double short_waves_ = 0;    // share of membrane viscosity that the fluid's answer to short waves is taken for
   double held_rate_ = 0;      // 1/us, fastest at which membranes relax against their own viscosity
   double outflow_limit_ = 0;  // um

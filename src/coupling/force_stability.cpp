@@ -27,16 +27,31 @@ double mean_spacing(const Grid& grid, int d) {
 
 }  // namespace
 
+/// With three digits, none of them rounded up.
+std::string ForceCoupling::rounded_down(double value) {
+  if (!(value > 0) || !std::isfinite(value)) return fmt::format("{:.3g}", value);
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 2);
+  return fmt::format("{:.3g}", std::floor(value / unit * (1 + 1e-12)) * unit);
+}
+
 /// @throws InputError
-void ForceCoupling::refuse_long_steps() const {
+void ForceCoupling::refuse_long_steps() {
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
-  if (!(longest <= stable_us_))
-    throw InputError(
-        fmt::format("time.step_us: steps of {:.3g} us are too long for these membranes, which move with the fluid: above about "
-                    "{:.3g} us{} they "
-                    "would swing and grow. Reduce time.step_us{}",
-                    longest, stable_us_, scene_.coupling->slip ? " with the slip correction" : "",
-                    scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
+  if (longest <= stable_us_) return;
+  // What the fluid resists depends on the step: viscous membranes stand somewhat less in steps as long as this one allows.
+  constexpr int rounds = 6;
+  const std::string cell = least_stable_;
+  double allowed = stable_us_;
+  for (int n = 0; n < rounds && membranes_->viscosity() && !packed_; ++n) {
+    measure_stability(allowed);
+    if (stable_us_ >= allowed) break;
+    allowed = stable_us_;
+  }
+  throw InputError(
+      fmt::format("time.step_us: steps of {:.5g} us are too long for these membranes, which move with the fluid: above about "
+                  "{} us{} {} would swing and grow. Reduce time.step_us{}",
+                  longest, rounded_down(allowed), scene_.coupling->slip ? " with the slip correction" : "", cell.empty() ? "they" : cell,
+                  scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 
 /// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on. With slip spheres and red cells of
@@ -152,7 +167,8 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
 /// lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
 /// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.02 of that and one grew slowly at 0.03: a
 /// fiftieth of it counts, where that is more than what they stand without. Each kind of cell by itself: some may have no viscosity.
-void ForceCoupling::measure_stability() {
+/// @param longest_us  of the steps, which the fluid's resistance depends on
+void ForceCoupling::measure_stability(double longest_us) {
   constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 50;
   update_surface_geometry(surfaces());
   transfer_->place(surfaces().x);
@@ -176,23 +192,32 @@ void ForceCoupling::measure_stability() {
     model.width = 0.8 * narrowest;
   }
   // Of the longest step: shorter ones meet more inertia, by less than they are shorter.
-  const double beta = anticipated_reaction(*std::max_element(lengths_us_.begin(), lengths_us_.end()));
+  const double beta = anticipated_reaction(longest_us);
   anticipate_short_waves(model, all, *standing);
   held_rate_ = comm.max(standing->fastest_held_relaxation_per_us(all, beta));
   double fastest = 0;
   for (const auto& of_kind : numbers) {
     double rate = comm.max(standing->fastest_relaxation_per_us(model, of_kind));
     if (membranes_->viscosity()) rate = std::min(rate, of_viscous * comm.max(standing->fastest_relaxation_per_us(model, of_kind, beta)));
-    fastest = std::max(fastest, rate);
+    if (rate > fastest) {
+      fastest = rate;
+      least_stable_ = membranes_->name_of(of_kind.front());
+      if (drawn_out_.count(of_kind.front()) > 0) least_stable_ += ", drawn out by its start_stretch,";
+    }
   }
-  if (loads_) fastest = std::max(fastest, comm.max(loads_->fastest_relaxation_per_us()));
+  if (numbers.size() < 2) least_stable_.clear();
+  const double of_loads = loads_ ? comm.max(loads_->fastest_relaxation_per_us()) : 0;
+  if (of_loads > fastest) fastest = of_loads, least_stable_.clear();
   stable_us_ = limit / fastest;
 }
 
 std::string ForceCoupling::stability_text(double dt) const {
-  return fmt::format(
-      "coupling: steps of {:.3g} us, of {} order; membranes that move with the fluid are stable up to about {:.3g} us{}", dt,
-      second_order(dt) ? "second" : "first", stable_us_, scene_.coupling->slip ? " with the slip correction (coupling.slip)" : "");
+  const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
+  const auto order = [this](double step) { return second_order(step) ? "second" : "first"; };
+  const std::string steps = longest > dt ? fmt::format("steps of {:.3g} us, of {} order, and up to {:.3g} us, of {} order", dt, order(dt), longest, order(longest))
+                                         : fmt::format("steps of {:.3g} us, of {} order", dt, order(dt));
+  return fmt::format("coupling: {}; membranes that move with the fluid are stable up to about {} us{}", steps, rounded_down(stable_us_),
+                     scene_.coupling->slip ? " with the slip correction (coupling.slip)" : "");
 }
 
 std::map<std::string, double> ForceCoupling::report(double dt) const {

@@ -110,6 +110,7 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
   std::stable_sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
     return fill_order(a.settings.type) < fill_order(b.settings.type);
   });
+  set_prescribed();
   if (prescribed_) {
     profile_ = Components<double>("corpuscle::fluid::boundary_profile", index.size(), 3);
     given_ = Components<double>("corpuscle::fluid::boundary_velocity", index.size(), 3);
@@ -122,6 +123,25 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     }
   }
   set_time(0);
+}
+
+/// Boxes of the sides whose velocity is given. A node that two of them share is left to the one that is filled last.
+void BoundaryConditions::set_prescribed() {
+  const auto is_given = [](const Side& side) { return side.here && fill_order(side.settings.type) >= fill_order(Type::velocity_inlet); };
+  for (std::size_t n = 0; n < sides_.size(); ++n) {
+    if (!is_given(sides_[n])) continue;
+    CellBox box = sides_[n].box;
+    for (std::size_t later = n + 1; later < sides_.size(); ++later) {
+      const Side& other = sides_[later];
+      if (!is_given(other) || other.d == sides_[n].d) continue;
+      if (other.end == 0)
+        box.lower[other.d] = 0;
+      else
+        box.upper[other.d] = grid_->index().n[other.d];
+    }
+    given_boxes_.zero[given_boxes_.boxes.count] = sides_[n].settings.type == Type::wall;
+    given_boxes_.boxes.add(box);
+  }
 }
 
 /// A parabola is known for boxes between walls, symmetric and periodic sides, and for round inlets within walls.
@@ -258,19 +278,11 @@ void BoundaryConditions::fill_sides(const Velocity& u, bool homogeneous) const {
   const IndexSpace& index = grid_->index();
   for (const auto& side : sides_) {
     if (!side.here) continue;
-    switch (side.settings.type) {
-      case Type::outflow: fill_outflow(index, side.box, side.inward, u); break;
-      case Type::symmetry:
-        fill_symmetry(index, side.box, side.inner, side.inward, side.to_face, grid_->views().face_area[side.d], u);
-        break;
-      case Type::wall: fill_zero(index, side.box, u); break;
-      default:
-        if (homogeneous)
-          fill_zero(index, side.box, u);
-        else
-          fill_given(index, side.box, given_, u);
-    }
+    if (side.settings.type == Type::outflow) fill_outflow(index, side.box, side.inward, u);
+    if (side.settings.type == Type::symmetry)
+      fill_symmetry(index, side.box, side.inner, side.inward, side.to_face, grid_->views().face_area[side.d], u);
   }
+  fill_given(index, given_boxes_, homogeneous, given_, u);
 }
 
 template void BoundaryConditions::fill_sides(const Components<double>&, bool) const;

@@ -63,6 +63,7 @@ class BoundaryConditions {
     int to_face = 0;     // padded offset from a boundary node to the index of its face
     CellBox faces;       // owned faces of the side
   };
+  void set_prescribed();
   void set_profile(const Side& side, const GridSettings* shape);
   void check_parabolic(const Side& side, bool box, const Triple& centre, double radius) const;
   template <class Velocity>
@@ -71,6 +72,7 @@ class BoundaryConditions {
   Grid* grid_;
   BoundarySettings::Type types_[6] = {};
   std::vector<Side> sides_;  // in the order in which they are filled: walls last, so that they win at edges
+  GivenBoxes given_boxes_;
   PressureMask outflow_;
   Components<double> profile_, given_;
   bool has_outflow_ = false, has_inlet_ = false, prescribed_ = false, natural_[3][2] = {};

@@ -23,6 +23,7 @@ std::array<int, 3> order_of(const IndexSpace& index) {
 }  // namespace
 
 BandCoarsest::BandCoarsest(MultigridHierarchy& hierarchy) {
+  BandSystem& band = direct_.band;
   const IndexSpace& index = hierarchy.levels().back().views.index;
   const auto order = order_of(index);
   const int n0 = index.n[order[0]], n1 = index.n[order[1]];
@@ -31,12 +32,12 @@ BandCoarsest::BandCoarsest(MultigridHierarchy& hierarchy) {
     for (int m = 0; m < 3; ++m) place[m] = folded(at[order[m]], index.n[order[m]], index.periodic[order[m]]);
     return place[0] + n0 * (place[1] + n1 * place[2]);
   };
-  band_.rows = index.owned();
-  band_.cell = Array<int>("corpuscle::multigrid::band_cell", band_.rows);
-  band_.neighbour = Table<int>("corpuscle::multigrid::band_neighbour", band_.rows, 6);
-  const auto cell = Kokkos::create_mirror_view(band_.cell);
-  const auto neighbour = Kokkos::create_mirror_view(band_.neighbour);
-  for (int e = 0; e < band_.rows; ++e) {
+  band.rows = index.owned();
+  band.cell = Array<int>("corpuscle::multigrid::band_cell", band.rows);
+  band.neighbour = Table<int>("corpuscle::multigrid::band_neighbour", band.rows, 6);
+  const auto cell = Kokkos::create_mirror_view(band.cell);
+  const auto neighbour = Kokkos::create_mirror_view(band.neighbour);
+  for (int e = 0; e < band.rows; ++e) {
     const std::array<int, 3> at{e % index.n[0], e / index.n[0] % index.n[1], e / (index.n[0] * index.n[1])};
     const int row = row_of(at);
     cell(row) = index.cell(at[0], at[1], at[2]);
@@ -47,36 +48,30 @@ BandCoarsest::BandCoarsest(MultigridHierarchy& hierarchy) {
       const bool outside = there[d] < 0 || there[d] >= index.n[d];
       if (outside && index.periodic[d]) there[d] = (there[d] + index.n[d]) % index.n[d];
       neighbour(row, side) = outside && !index.periodic[d] ? -1 : row_of(there);
-      band_.width = std::max(band_.width, neighbour(row, side) - row);
+      band.width = std::max(band.width, neighbour(row, side) - row);
     }
   }
-  Kokkos::deep_copy(band_.cell, cell);
-  Kokkos::deep_copy(band_.neighbour, neighbour);
-  band_.lower = Table<double>("corpuscle::multigrid::band_lower", band_.rows + band_.width, band_.width + 1);
-  band_.upper = Table<double>("corpuscle::multigrid::band_upper", band_.rows, band_.width + 1);
-  band_.inverse = Array<double>("corpuscle::multigrid::band_inverse", band_.rows);
-  band_.x = Array<double>("corpuscle::multigrid::band_x", band_.rows + 2 * band_.width);
+  Kokkos::deep_copy(band.cell, cell);
+  Kokkos::deep_copy(band.neighbour, neighbour);
+  band.lower = Table<double>("corpuscle::multigrid::band_lower", band.rows + band.width, band.width + 1);
+  band.upper = Table<double>("corpuscle::multigrid::band_upper", band.rows, band.width + 1);
+  band.inverse = Array<double>("corpuscle::multigrid::band_inverse", band.rows);
+  band.x = Array<double>("corpuscle::multigrid::band_x", band.rows + 2 * band.width);
 }
 
 void BandCoarsest::update(const MultigridLevel& level) {
-  assemble_band(level, band_);
-  factorise_band(band_);
+  assemble_band(level, direct_.band);
+  factorise_band(direct_.band);
 }
 
-void BandCoarsest::solve(const MultigridLevel&, const Array<CycleReal>& b, const Array<CycleReal>& x) {
-  solve_band(band_, b, x);
+InverseCoarsest::InverseCoarsest(MultigridHierarchy& hierarchy) : BandCoarsest(hierarchy) {
+  const BandSystem& band = direct_.band;
+  direct_.inverse = Table<double>("corpuscle::multigrid::inverse", band.rows, band.rows + 2 * band.width);
 }
-
-InverseCoarsest::InverseCoarsest(MultigridHierarchy& hierarchy)
-    : BandCoarsest(hierarchy), inverse_("corpuscle::multigrid::inverse", band_.rows, band_.rows + 2 * band_.width) {}
 
 void InverseCoarsest::update(const MultigridLevel& level) {
   BandCoarsest::update(level);
-  invert_band(band_, inverse_);
-}
-
-void InverseCoarsest::solve(const MultigridLevel&, const Array<CycleReal>& b, const Array<CycleReal>& x) {
-  apply_inverse(band_, inverse_, b, x);
+  invert_band(direct_.band, direct_.inverse);
 }
 
 AmgCoarsest::AmgCoarsest(MultigridHierarchy& hierarchy)

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "fluid/algebraic_multigrid.hpp"
-#include "fluid/band_solver.hpp"
 #include "fluid/multigrid_hierarchy.hpp"
+#include "fluid/small_levels.hpp"
 
 #include <memory>
 
@@ -14,8 +14,10 @@ class CoarsestSolver {
   virtual ~CoarsestSolver() = default;
   /// Take over the level's operator. @throws ComputationError  on all ranks, when that fails on any
   virtual void update(const MultigridLevel& level) = 0;
+  /// What solves it together with the other small levels, with the same arrays ever after; null where solve() does.
+  virtual const DirectLevel* direct() const { return nullptr; }
   /// x close to the solution for b, [cell] of the level: a symmetric operator.
-  virtual void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) = 0;
+  virtual void solve(const MultigridLevel&, const Array<CycleReal>&, const Array<CycleReal>&) {}
   /// On all ranks together. @throws ComputationError  on all of them, if solve() has failed on any since the last update()
   virtual void raise() {}
 };
@@ -26,10 +28,10 @@ class BandCoarsest : public CoarsestSolver {
  public:
   explicit BandCoarsest(MultigridHierarchy& hierarchy);
   void update(const MultigridLevel& level) override;
-  void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
+  const DirectLevel* direct() const override { return &direct_; }
 
  protected:
-  BandSystem band_;
+  DirectLevel direct_;
 };
 
 /// The same, by the inverse: for devices, where one sweep after the other through a band, row by row, waits for memory all the
@@ -38,10 +40,6 @@ class InverseCoarsest : public BandCoarsest {
  public:
   explicit InverseCoarsest(MultigridHierarchy& hierarchy);
   void update(const MultigridLevel& level) override;
-  void solve(const MultigridLevel& level, const Array<CycleReal>& b, const Array<CycleReal>& x) override;
-
- private:
-  Table<double> inverse_;
 };
 
 /// One cycle of BoomerAMG, for levels of many cells.

@@ -1,5 +1,6 @@
 #include "fluid/multigrid_cycle.hpp"
 
+#include <algorithm>
 #include <type_traits>
 #include <utility>
 
@@ -29,6 +30,33 @@ MultigridCycle<Field>::MultigridCycle(MultigridHierarchy& hierarchy, const Smoot
     level.views.inverse = Array<CycleReal>("corpuscle::multigrid::inverse", index.size());
     levels_.push_back(std::move(level));
   }
+  find_small_levels();
+}
+
+template <class Field>
+void MultigridCycle<Field>::find_small_levels() {
+  using Small = SmallLevels<Field>;
+  const auto& shared = hierarchy_->levels();
+  const auto is_small = [&](std::size_t l) {
+    return shared[l].comm.size() == 1 && levels_[l].views.index.owned() <= Small::most_cells && levels_.size() - l <= Small::most;
+  };
+  for (first_small_ = levels_.size(); first_small_ > 0 && is_small(first_small_ - 1);) --first_small_;
+  small_.steps = smoothing_.steps;
+  ChebyshevSteps steps(smoothing_.from, smoothing_.to);
+  for (int n = 0; n < small_.steps; ++n) small_.step[n] = steps.next();
+  for (std::size_t l = first_small_; l < levels_.size(); ++l) {
+    const Level& level = levels_[l];
+    small_.level[l - first_small_] = {level.views, level.b, level.x, level.y};
+  }
+}
+
+template <class Field>
+void MultigridCycle<Field>::run_small(int depth) {
+  small_.count = std::min(depth + 1, static_cast<int>(levels_.size() - first_small_));
+  small_.direct = direct_ && first_small_ + small_.count == levels_.size();
+  const Level& first = levels_[first_small_];  // of the whole grid's own the owner may have put another b
+  small_.level[0].b = first.b, small_.level[0].x = first.x, small_.level[0].y = first.y;
+  run_small_levels(small_);
 }
 
 template <class Field>
@@ -46,16 +74,22 @@ void MultigridCycle<Field>::update() {
 }
 
 template <class Field>
+template <class Body>
+void MultigridCycle<Field>::pass(const char* step, const Level& level, const Body& body) {
+  for_owned_rounded(cycle_label<Field>(step), level.views.index, body);
+}
+
+template <class Field>
 void MultigridCycle<Field>::smooth_down(std::size_t number) {
   Level& level = levels_[number];
   Halo& halo = hierarchy_->levels()[number].halo;
   halo.exchange(level.b, 1);
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   const auto first = steps.next(), second = steps.next();
-  smooth_from_zero(level.views, first, second, level.b, level.y, level.x);
+  pass("smooth_from_zero", level, SmoothFromZero<Field>(level.views, first, second, level.b, level.y, level.x));
   for (int n = 2; n < smoothing_.steps; ++n) {
     halo.exchange(level.x, 1);
-    smooth(level.views, steps.next(), level.b, level.x, level.y);
+    pass("smooth", level, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y));
     std::swap(level.x, level.y);
   }
 }
@@ -66,7 +100,7 @@ void MultigridCycle<Field>::smooth_up(std::size_t number) {
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   for (int n = 0; n < smoothing_.steps; ++n) {
     hierarchy_->levels()[number].halo.exchange(level.x, 1);
-    smooth(level.views, steps.next(), level.b, level.x, level.y);
+    pass("smooth", level, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y));
     std::swap(level.x, level.y);
   }
 }
@@ -74,6 +108,7 @@ void MultigridCycle<Field>::smooth_up(std::size_t number) {
 template <class Field>
 void MultigridCycle<Field>::descend(std::size_t number, int depth) {
   Level& level = levels_[number];
+  if (number >= first_small_ && !solve_coarsest) return run_small(depth);
   const bool coarsest = number + 1 == levels_.size();
   if (coarsest && solve_coarsest) return solve_coarsest(level);
   smooth_down(number);
@@ -82,13 +117,13 @@ void MultigridCycle<Field>::descend(std::size_t number, int depth) {
     Level& coarse = levels_[number + 1];
     auto& shared = hierarchy_->levels()[number + 1];
     halo.exchange(level.x, 1);
-    level_residual(level.views, level.b, level.x, level.y);
+    pass("residual", level, LevelResidual<Field>{level.views, level.b, level.x, level.y});
     if (level.views.split) halo.exchange(level.y, 1);
     restrict_sums(level.views, coarse.views.index, level.y, coarse.b);
     if (shared.cells) shared.cells->run(coarse.b);
     descend(number + 1, depth - 1);
     if (level.views.split) shared.halo.exchange(coarse.x, 1);
-    add_correction(level.views, coarse.views.index, coarse.x, level.x);
+    pass("prolong", level, AddCorrection<Field>(level.views, coarse.views.index, coarse.x, level.x));
   }
   smooth_up(number);
 }

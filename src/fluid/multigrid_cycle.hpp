@@ -2,12 +2,13 @@
 #pragma once
 
 #include "fluid/multigrid_hierarchy.hpp"
+#include "fluid/small_levels.hpp"
 
 #include <functional>
 
 namespace corpuscle {
 
-/// Chebyshev steps before and after a coarser level, at least 2, on this part of the spectrum of D^-1 A, which ends at 2.
+/// Chebyshev steps before and after a coarser level, 2 to SmallLevels::most_steps, on this part of the spectrum of D^-1 A, which ends at 2.
 struct Smoothing {
   int steps;
   double from, to;
@@ -33,10 +34,16 @@ class MultigridCycle {
   void run(int depth) { descend(0, depth); }
 
   std::vector<Level>& levels() { return levels_; }
-  /// Solves the coarsest level, x for b; smoothing does while there is none.
+  /// The coarsest level, from now on, instead of smoothing it; together with the other small ones. Shared.
+  void solve_directly(const DirectLevel& coarsest) { small_.coarsest = coarsest, direct_ = true; }
+  /// Solves the coarsest level, x for b, where that is neither smoothed nor solved directly.
   std::function<void(Level&)> solve_coarsest;
 
  private:
+  template <class Body>
+  static void pass(const char* step, const Level& level, const Body& body);
+  void find_small_levels();
+  void run_small(int depth);
   void descend(std::size_t number, int depth);
   void smooth_down(std::size_t number);
   void smooth_up(std::size_t number);
@@ -44,6 +51,9 @@ class MultigridCycle {
   MultigridHierarchy* hierarchy_;
   Smoothing smoothing_;
   std::vector<Level> levels_;
+  std::size_t first_small_ = 0;  // from here on levels are done in one go
+  SmallLevels<Field> small_;
+  bool direct_ = false;
 };
 
 }  // namespace corpuscle

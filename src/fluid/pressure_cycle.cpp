@@ -12,7 +12,10 @@ constexpr Smoothing smoothing{3, 0.2, 2.0};
 
 PressureCycle::PressureCycle(MultigridHierarchy& hierarchy, std::unique_ptr<CoarsestSolver> coarsest)
     : cycle_(hierarchy, smoothing), coarsest_(coarsest ? std::move(coarsest) : make_coarsest_solver(hierarchy)) {
-  cycle_.solve_coarsest = [this](Cycle::Level& level) { coarsest_->solve(level.views, level.b, level.x); };
+  if (const DirectLevel* direct = coarsest_->direct())
+    cycle_.solve_directly(*direct);
+  else
+    cycle_.solve_coarsest = [this](Cycle::Level& level) { coarsest_->solve(level.views, level.b, level.x); };
 }
 
 void PressureCycle::update(int pinned) {

@@ -80,7 +80,9 @@ class Membranes {
   /// Of a cell in the whole scene.
   int number(int cell) const { return number_[cell]; }
   /// As the case file addresses it.
-  std::string name(int cell) const { return names_.of(number_[cell]); }
+  std::string name(int cell) const { return name_of(number_[cell]); }
+  /// Of the cell with that number, on whatever rank it is.
+  std::string name_of(int number) const { return names_.of(number); }
   void call(const CellNames& names);
   /// Whether anything but its in-plane law answers a change of a cell's area.
   bool holds_area(int cell) const { return holds_area_[cell]; }

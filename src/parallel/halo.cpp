@@ -141,14 +141,22 @@ template <class Field>
 void Halo::run(const Field& field, int layers) {
   using Value = typename Field::non_const_value_type;
   [[maybe_unused]] const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
+  // What comes from this rank itself, along directions that follow each other, in one go.
+  CellBoxes within;
+  std::array<bool, 3> wraps{};
+  const auto copy_within = [&] {
+    copy_around_periods(index_, within, wraps, field);
+    within = {}, wraps = {};
+  };
   for (int d = 0; d < 3; ++d) {
     const int low = neighbour_[d][0], high = neighbour_[d][1];
     if (low < 0 && high < 0) continue;
-    if (low == comm_.rank() && high == comm_.rank()) {  // periodic within this rank
-      copy_shifted(index_, slab(index_, d, 0, true, layers), d, index_.n[d], field);
-      copy_shifted(index_, slab(index_, d, 1, true, layers), d, -index_.n[d], field);
+    if (low == comm_.rank() && high == comm_.rank()) {
+      for (int side = 0; side < 2; ++side) within.add(slab(index_, d, side, true, layers));
+      wraps[d] = true;
       continue;
     }
+    copy_within();
 #ifdef CORPUSCLE_MPI
     if (d == 2 && whole_planes_pass) {
       exchange_planes(comm_, index_, neighbour_[2], field, components, layers);
@@ -184,6 +192,7 @@ void Halo::run(const Field& field, int layers) {
     }
 #endif
   }
+  copy_within();
 }
 
 template void Halo::run(const Components<double>&, int);

@@ -182,6 +182,31 @@ TEST_CASE("steps that are not refused are stable where fluids differ and where s
   }
 }
 
+TEST_CASE("a refusal tells the step that is taken then, and which cell asks for it", "[coupling][force]") {
+  ShearedCapsule capsule;
+  capsule.vertices = 300;
+  Case scene = capsule.scene(1);
+  for (int& n : scene.grid->nodes) n = 21;
+  scene.cells[0].shear_modulus_uN_per_m = 300, scene.cells[0].bending_modulus_fJ = 0.2, scene.cells[0].membrane_viscosity_N_s_per_m = 5e-8;
+  scene.cells[0].center_um = {-6, 0, 0};
+  scene.cells.push_back(scene.cells[0]);
+  scene.cells[1].center_um = {6, 0, 0};
+  scene.cells[1].start_stretch = {1.02, 1, 1 / 1.02};
+  const auto told = [&](double step) {
+    scene.time = {step, step};
+    const std::string text = refusal(scene);
+    INFO(text);
+    REQUIRE(text.find("above about") != std::string::npos);
+    CHECK_THAT(text, Catch::Matchers::Contains("cells.1, drawn out by its start_stretch, would swing"));
+    return std::stod(text.substr(text.find("above about") + 12));
+  };
+  const double most = told(1e5);
+  CHECK(told(2 * most) == Approx(most).epsilon(0.02));
+  told(1.02 * most);
+  scene.time = {most, most};
+  CHECK(refusal(scene) == "accepted");
+}
+
 TEST_CASE("steps that are not refused are stable without slip, in bends, and with stiff viscous membranes", "[coupling][force]") {
   // Drawn out by 5 % at rest, spheres go back; what swings grows. Second order is sound up to 0.45 of the limit without slip (it broke down at
   // 0.59), the cell inside a bend is in the narrowest spacings (230 us were told where it stands 81) and that outside slips most, and of what

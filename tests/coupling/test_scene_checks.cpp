@@ -146,9 +146,9 @@ TEST_CASE("walls that would tear a cell in a step are refused, and fast ones war
   const Box box;
   auto sides = between(Type::moving_wall, Type::moving_wall);  // 12 um apart
   sides[4].velocity = Triple{-0.3, 0, 0}, sides[5].velocity = Triple{0.3, 0, 0};
-  const auto strain = [&](double step_us) {
+  const auto strain = [&](double step_us, bool viscous = false) {
     try {
-      return check_wall_strain(box.grid, sides, step_us);
+      return check_wall_strain(box.grid, sides, step_us, viscous);
     } catch (const InputError& error) {
       return std::string("InputError: ") + error.what();
     }
@@ -156,6 +156,8 @@ TEST_CASE("walls that would tear a cell in a step are refused, and fast ones war
   CHECK(strain(9.9).empty());
   CHECK_THAT(strain(10.1), !Contains("InputError: ") && Contains("boundary.4.velocity_mm_per_s = [-300, 0, 0]") && Contains("12 um away") &&
                                Contains("600 mm/s") && Contains("by 0.505 in a step of 10.1 us") && Contains("time.step_us to 9.8 us"));
+  CHECK(strain(1.98, true).empty());
+  CHECK_THAT(strain(2.02, true), Contains("by 0.101 in a step of 2.02 us") && Contains("0.1 is the most that a cell whose membrane is viscous follows well"));
   CHECK_THAT(strain(39.9), !Contains("InputError: ") && Contains("strains"));
   CHECK_THAT(strain(40.1), Contains("InputError: boundary.4.velocity_mm_per_s"));
   sides[5].velocity = sides[4].velocity;  // the fluid between goes with them
