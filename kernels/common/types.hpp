@@ -42,6 +42,12 @@ class HostCopy {
   }
   /// Puts back what was changed in the copy.
   void write() const { Kokkos::deep_copy(view_, host_); }
+  /// Of a view of one value.
+  template <class Value>
+  void set(const Value& value) const {
+    host_() = value;
+    write();
+  }
   bool is_of(const View& view) const { return view.data() == view_.data() && view.size() == view_.size(); }
 
  private:

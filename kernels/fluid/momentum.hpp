@@ -307,23 +307,35 @@ inline double scaled_dot(const IndexSpace& index, const Array<float>& inverse, c
   });
 }
 
-/// u += factor direction at fluid nodes, r -= factor image; returns this rank's scaled r . r.
-inline double advance_velocity(const IndexSpace& index, const Array<float>& inverse, double factor,
-                               const Components<float>& direction, const Components<float>& image,
-                               const Components<double>& u, const Components<float>& r) {
+/// Of a . b and of a . a.
+inline void scaled_dots(const IndexSpace& index, const Array<float>& inverse, const Components<float>& a, const Components<float>& b,
+                        const Kokkos::View<Sums<2>, Memory>& sums) {
+  sums_owned("corpuscle::fluid::scaled_dots", index, KOKKOS_LAMBDA(int i, int j, int k) {
+    const int c = index.cell(i, j, k);
+    const float both = a(c, 0) * b(c, 0) + a(c, 1) * b(c, 1) + a(c, 2) * b(c, 2);
+    const float own = a(c, 0) * a(c, 0) + a(c, 1) * a(c, 1) + a(c, 2) * a(c, 2);
+    return Sums<2>{{inverse(c) * inverse(c) * both, inverse(c) * inverse(c) * own}};
+  }, sums);
+}
+
+/// u += factor direction at fluid nodes, r -= factor image; this rank's scaled r . r and shadow . r.
+inline void advance_velocity(const IndexSpace& index, const Array<float>& inverse, double factor, const Components<float>& direction,
+                             const Components<float>& image, const Components<float>& shadow, const Components<double>& u,
+                             const Components<float>& r, const Kokkos::View<Sums<2>, Memory>& sums) {
   const float of_image = factor;
-  return sum_owned("corpuscle::fluid::advance_velocity", index, KOKKOS_LAMBDA(int i, int j, int k) {
+  sums_owned("corpuscle::fluid::advance_velocity", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     const double step = inverse(c) > 0 ? factor : 0.0;
-    float square = 0;
+    float square = 0, along = 0;
     for (int m = 0; m < 3; ++m) {
       u(c, m) += step * direction(c, m);
       const float left = r(c, m) - of_image * image(c, m);
       r(c, m) = left;
       square += left * left;
+      along += shadow(c, m) * left;
     }
-    return inverse(c) * inverse(c) * square;
-  });
+    return Sums<2>{{inverse(c) * inverse(c) * square, inverse(c) * inverse(c) * along}};
+  }, sums);
 }
 
 /// p = r + beta (p - w v).

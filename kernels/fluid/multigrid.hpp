@@ -277,6 +277,39 @@ struct AddCorrection {
   }
 };
 
+/// A pass over cells that leaves the layer of `field` beyond periodic sides of this rank's own valid as far as an operator reaches it.
+template <class Body, class Field>
+struct WithImages {
+  Body body;
+  IndexSpace index;
+  bool wraps[3];
+  Field field;
+
+  KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
+    body(i, j, k);
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+    const int at[3] = {i, j, k}, c = index.cell(i, j, k);
+    for (int d = 0; d < 3; ++d)
+      if (wraps[d]) copy_to_image(d, at[d], c);
+#endif
+  }
+  KOKKOS_FORCEINLINE_FUNCTION void copy_to_image(int d, int at, int c) const {
+    const int around = index.n[d] * index.stride(d);
+    if (at == 0) set_value(field, c + around, value_at(field, c));
+    if (at == index.n[d] - 1) set_value(field, c - around, value_at(field, c));
+  }
+  /// On the host lines are vectorised: their images are made afterwards.
+  KOKKOS_FORCEINLINE_FUNCTION void end_line(int j, int k) const {
+    const int first = index.cell(0, j, k);
+    if (wraps[0])
+      for (int i = 0; i < index.n[0]; i += index.n[0] > 1 ? index.n[0] - 1 : 1) copy_to_image(0, i, first + i);
+    const int at[3] = {0, j, k};
+    for (int d = 1; d < 3; ++d)
+      if (wraps[d] && (at[d] == 0 || at[d] == index.n[d] - 1))
+        for (int i = 0; i < index.n[0]; ++i) copy_to_image(d, at[d], first + i);
+  }
+};
+
 inline void compact_scalar(const IndexSpace& index, const Array<CycleReal>& field, const Array<double>& vector) {
   for_owned("corpuscle::multigrid::to_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
     vector(index.compact(i, j, k)) = field(index.cell(i, j, k));
@@ -304,45 +337,11 @@ inline void level_rows(const MultigridLevel& level, const Table<double>& value) 
   });
 }
 
-/// out = A p; returns this rank's p . A p.
-inline double apply_and_dot(const LevelOperator<double>& level, const Array<double>& p, const Array<double>& out) {
-  const IndexSpace index = level.index;
-  return sum_owned("corpuscle::multigrid::operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const double value = level.apply(p, c);
-    out(c) = value;
-    return p(c) * value;
-  });
-}
-
-/// x += alpha p, r -= alpha q, both in double; returns this rank's r . r. `rounded` = `scale` r, for the cycle.
-inline double advance_and_norm(const IndexSpace& index, double alpha, double scale, const Array<double>& p,
-                               const Array<double>& q, const Array<double>& x, const Array<double>& r,
-                               const Array<CycleReal>& rounded) {
-  return sum_owned("corpuscle::multigrid::advance", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    x(c) += alpha * p(c);
-    const double value = r(c) - alpha * q(c);
-    r(c) = value;
-    rounded(c) = scale * value;
-    return value * value;
-  });
-}
-
 template <class Real>
 double owned_dot(const IndexSpace& index, const Array<double>& a, const Array<Real>& b) {
   return sum_owned("corpuscle::multigrid::dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = index.cell(i, j, k);
     return a(c) * b(c);
-  });
-}
-
-/// p = scale z + beta p on owned cells.
-inline void new_direction(const IndexSpace& index, double beta, double scale, const Array<CycleReal>& z,
-                          const Array<double>& p) {
-  for_owned("corpuscle::multigrid::direction", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    p(c) = scale * z(c) + beta * p(c);
   });
 }
 

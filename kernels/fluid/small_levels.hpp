@@ -133,6 +133,7 @@ KOKKOS_INLINE_FUNCTION void cycle_small_levels(const Cells& cells, const SmallLe
       cells.rounded(level.views.index, AddCorrection<Field>(level.views, s.level[l + 1].views.index, s.level[l + 1].x, changed ? level.y : level.x));
     smooth_level(cells, s, level, 0, s.steps, changed);
   }
+  wrap_level(cells, s.level[0].views.index, s.level[0].x);
 }
 
 template <class Field>

@@ -1,6 +1,7 @@
 // Indexing of one rank's block of a structured grid.
 #pragma once
 
+#include "common/sums.hpp"
 #include "common/types.hpp"
 
 #include <array>
@@ -127,18 +128,20 @@ class LineShare {
   int left_, lower_j_, upper_j_;
 };
 
-#if !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
-/// Boxes of fewer cells than this are done by the calling thread. Waking the others and waiting for them costs 2 us with a
-/// core for each, and many times that where other work has one of the cores; a cell costs 1 to 5 ns.
-constexpr int worth_threads = 2048;
-
-#if defined(KOKKOS_ENABLE_SERIAL)
+/// Where a loop of one iteration runs: in the thread that calls, where there are processors alone.
+#if defined(KOKKOS_ENABLE_SERIAL) && !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
 using CallingThread = Kokkos::Serial;
 #else
 using CallingThread = Exec;
 #endif
 
-/// Run `body(i, j, k)` for one thread's share of the lines of a box.
+#if !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
+/// Boxes of fewer cells than this are done by the calling thread. Waking the others and waiting for them costs 2 us with a
+/// core for each, and many times that where other work has one of the cores; a cell costs 1 to 5 ns.
+constexpr int worth_threads = 2048;
+
+/// Run `body(i, j, k)` for one thread's share of the lines of a box, and body.end_line(j, k), if there is one, after each line; or
+/// body.line(begin, end, j, k), if there is that.
 template <class Body>
 void run_lines(const std::array<int, 3>& lower, const std::array<int, 3>& upper, int thread, int threads,
                const Body& body) {
@@ -146,10 +149,15 @@ void run_lines(const std::array<int, 3>& lower, const std::array<int, 3>& upper,
   const int begin = lower[0], end = upper[0];
   for (LineShare line(lower, upper, thread, threads); line.any(); line.next()) {
     const int j = line.j, k = line.k;
+    if constexpr (requires { cell.line(begin, end, j, k); }) {
+      cell.line(begin, end, j, k);
+      continue;
+    }
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC ivdep
 #endif
     for (int i = begin; i < end; ++i) cell(i, j, k);
+    if constexpr (requires { cell.end_line(j, k); }) cell.end_line(j, k);
   }
 }
 
@@ -167,6 +175,33 @@ double sum_lines(const std::array<int, 3>& upper, int thread, int threads, const
     sum += part;
   }
   return sum;
+}
+
+/// The same of up to nine sums, which vector reductions want by name.
+template <int n, class Body>
+void sum_lines(const std::array<int, 3>& upper, int thread, int threads, const Body& body, Sums<n>& total) {
+  static_assert(n <= 9);
+  const Body cell = body;
+  const int end = upper[0];
+  for (LineShare line({0, 0, 0}, upper, thread, threads); line.any(); line.next()) {
+    const int j = line.j, k = line.k;
+    double a = 0, b = 0, c = 0, d = 0, e = 0, f = 0, g = 0, h = 0, l = 0;
+#pragma omp simd reduction(+ : a, b, c, d, e, f, g, h, l)
+    for (int i = 0; i < end; ++i) {
+      const Sums<n> s = cell(i, j, k);
+      a += s[0];
+      if constexpr (n > 1) b += s[1];
+      if constexpr (n > 2) c += s[2];
+      if constexpr (n > 3) d += s[3];
+      if constexpr (n > 4) e += s[4];
+      if constexpr (n > 5) f += s[5];
+      if constexpr (n > 6) g += s[6];
+      if constexpr (n > 7) h += s[7];
+      if constexpr (n > 8) l += s[8];
+    }
+    const double parts[9] = {a, b, c, d, e, f, g, h, l};
+    for (int m = 0; m < n; ++m) total[m] += parts[m];
+  }
 }
 #endif
 
@@ -254,6 +289,24 @@ double sum_owned(const std::string& label, const IndexSpace& index, const Body& 
     Kokkos::parallel_reduce(label, Policy(0, threads), share, sum);
 #endif
   return sum;
+}
+
+/// Several sums in one reduction, on the device or where the host can wait for them: `body(i, j, k)` returns a Sums<n>, n up to 9.
+template <int n, class Body>
+void sums_owned(const std::string& label, const IndexSpace& index, const Body& body, const Kokkos::View<Sums<n>, Memory>& result) {
+  const Kokkos::Sum<Sums<n>, Memory> into(result);
+#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
+  Kokkos::parallel_reduce(
+      label, Policy(0, index.owned()), KOKKOS_LAMBDA(int e, Sums<n>& total) { total += index.visit_compact(e, body); }, into);
+#else
+  const std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
+  const int threads = Exec().concurrency();
+  const auto share = [=](int thread, Sums<n>& total) CORPUSCLE_INLINE_ALL { sum_lines(upper, thread, threads, body, total); };
+  if (index.owned() < worth_threads)
+    Kokkos::parallel_reduce(label, Kokkos::RangePolicy<CallingThread>(0, threads), share, into);
+  else
+    Kokkos::parallel_reduce(label, Policy(0, threads), share, into);
+#endif
 }
 
 }  // namespace corpuscle

@@ -204,35 +204,64 @@ struct Planes {
   int begin = 0, end = 0;
 };
 
-/// across [cell] kPa at the faces of this rank in some planes, of which all markers that reach them have rows: gathered, in the order of
-/// cells and of markers in them.
+/// across [cell] kPa at the faces of this rank: gathered, in the order of cells and of markers in them.
+template <class Delta>
+struct SpreadForces {
+  static constexpr int points = Delta::points;
+  MarkerViews m;
+  IndexSpace index;
+  FaceForce out;
+
+  /// Weights of a marker at a cell and its low face along e.
+  KOKKOS_INLINE_FUNCTION bool reached(int row, int e, int at, double& of_cell, double& of_face) const {
+    const int p = at - m.base(row, e), q = at - m.base(row, e + 3);
+    of_cell = p >= 0 && p < points ? m.weight(row, e * points + p) : 0;
+    of_face = q >= 0 && q < points ? m.weight(row, (e + 3) * points + q) : 0;
+    return of_cell != 0 || of_face != 0;
+  }
+  KOKKOS_INLINE_FUNCTION void operator()(int i, int j, int k) const {
+    double sum[3] = {0, 0, 0};
+    visit_markers<Delta>(index, m, i, j, k, [&](int row) {
+      double w[6];
+      if (!reached(row, 2, k, w[2], w[5]) || !reached(row, 1, j, w[1], w[4]) || !reached(row, 0, i, w[0], w[3])) return;
+      sum[0] += w[3] * w[1] * w[2] * m.across(row, 0);
+      sum[1] += w[0] * w[4] * w[2] * m.across(row, 1);
+      sum[2] += w[0] * w[1] * w[5] * m.across(row, 2);
+    });
+    const int c = index.cell(i, j, k);
+    for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
+  }
+  /// The same for the cells begin <= i < end of a line, where each marker is looked at once: on the host, which has a line a thread.
+  void line(int begin, int end, int j, int k) const {
+    constexpr int below = MarkerReach<Delta>::below, above = MarkerReach<Delta>::above;
+    const int first = index.cell(0, j, k);
+    for (int d = 0; d < 3; ++d)
+      for (int i = begin; i < end; ++i) out.across[d](first + i) = 0;
+    for (int dk = below; dk <= above; ++dk)
+      for (int dj = below; dj <= above; ++dj) {
+        const int last = m.start(index.cell(end - 1 + above, j + dj, k + dk) + 1);
+        for (int s = m.start(index.cell(begin + below, j + dj, k + dk)); s < last; ++s) {
+          const int row = s - m.first;
+          double w[6];
+          if (!reached(row, 2, k, w[2], w[5]) || !reached(row, 1, j, w[1], w[4])) continue;
+          const int base = m.base(row, 0), face = m.base(row, 3), low = base < face ? base : face, high = (base < face ? face : base) + points;
+          const double q[3] = {m.across(row, 0), m.across(row, 1), m.across(row, 2)};
+          for (int i = low > begin ? low : begin; i < (high < end ? high : end); ++i) {
+            if (!reached(row, 0, i, w[0], w[3])) continue;
+            out.across[0](first + i) += w[3] * w[1] * w[2] * q[0];
+            out.across[1](first + i) += w[0] * w[4] * w[2] * q[1];
+            out.across[2](first + i) += w[0] * w[1] * w[5] * q[2];
+          }
+        }
+      }
+  }
+};
+
+/// In some planes, of which all markers that reach them have rows.
 template <class Delta>
 void spread_forces(const TransferBlock& block, const MarkerViews& markers, const Planes& planes, const FaceForce& force) {
-  const MarkerViews m = markers;
-  const IndexSpace index = block.index();
-  const FaceForce out = force;
-  for_box(
-      "corpuscle::transfer::spread_forces", {0, 0, planes.begin}, {block.rows(0, true), block.rows(1, true), planes.end},
-      KOKKOS_LAMBDA(int i, int j, int k) {
-        constexpr int points = Delta::points;
-        const int at[3] = {i, j, k}, c = index.cell(i, j, k);
-        double sum[3] = {0, 0, 0};
-        visit_markers<Delta>(index, m, i, j, k, [&](int row) {
-          double w[6];
-          const auto reached = [&](int d) {  // along d, by cells or faces
-            for (int e = d; e < 6; e += 3) {
-              const int p = at[d] - m.base(row, e);
-              w[e] = p >= 0 && p < points ? m.weight(row, e * points + p) : 0;
-            }
-            return w[d] != 0 || w[d + 3] != 0;
-          };
-          if (!reached(2) || !reached(1) || !reached(0)) return;
-          sum[0] += w[3] * w[1] * w[2] * m.across(row, 0);
-          sum[1] += w[0] * w[4] * w[2] * m.across(row, 1);
-          sum[2] += w[0] * w[1] * w[5] * m.across(row, 2);
-        });
-        for (int d = 0; d < 3; ++d) out.across[d](c) = sum[d];
-      });
+  for_box("corpuscle::transfer::spread_forces", {0, 0, planes.begin}, {block.rows(0, true), block.rows(1, true), planes.end},
+          SpreadForces<Delta>{markers, block.index(), force});
 }
 
 /// Velocity that the sides give, where the face's point is reflected last along `last`: beyond other sides too it is itself

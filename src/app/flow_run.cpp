@@ -10,6 +10,7 @@
 #include "output/on_root.hpp"
 #include "populations/populations.hpp"
 #include "parallel/agree.hpp"
+#include "parallel/traffic.hpp"
 
 #include <fmt/ranges.h>
 
@@ -140,6 +141,17 @@ void report_breakdown(const Comm& comm, const std::string& folder, FlowOutput* o
   }
 }
 
+/// Of the rank that sends most, a step of this run, output included: what many ranks must not have more of than few.
+void report_traffic(const Comm& comm, const Traffic& before, long steps, Report& report) {
+  if (comm.size() == 1 || steps == 0) return;
+  const Traffic now = traffic();
+  double each[3] = {static_cast<double>(now.messages - before.messages), static_cast<double>(now.bytes - before.bytes),
+                    static_cast<double>(now.reductions - before.reductions)};
+  comm.max(each, 3);
+  const double n = static_cast<double>(steps);
+  report.extra["traffic"] = {{"messages_per_step", each[0] / n}, {"bytes_per_step", each[1] / n}, {"reductions_per_step", each[2] / n}};
+}
+
 /// Steps until the end, a signal, or a cell at the outflow.
 /// @return the signal, or an empty text
 std::string advance(FlowSimulation& simulation, FlowOutput& output, StopSignal& signal, Progress& progress) {
@@ -212,7 +224,10 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
     } else {
       output->after_step(true);
     }
+    const Traffic before = traffic();
+    const long first = simulation.steps();
     report.stopped = advance(simulation, *output, signal, progress);
+    report_traffic(comm, before, simulation.steps() - first, report);
     progress.finish();
     if (!report.stopped.empty()) output->stop();
   } catch (const std::exception& error) {

@@ -4,6 +4,8 @@
 #include <string>
 #include <tuple>
 
+#include "parallel/traffic.hpp"
+
 namespace corpuscle {
 
 namespace {
@@ -100,8 +102,10 @@ void CopyMessages::pass(const Side& from, const Side& to) const {
         MPI_Irecv(&to.host(s.first, 0), 3 * s.count, MPI_DOUBLE, s.rank, tag, comm_.handle(), &requests.emplace_back());
     Kokkos::deep_copy(from.host, from.message);
     for (const Segment& s : from.segments)
-      if (!is_own(s))
+      if (!is_own(s)) {
+        traffic().sent(3L * s.count * static_cast<long>(sizeof(double)));
         MPI_Isend(&from.host(s.first, 0), 3 * s.count, MPI_DOUBLE, s.rank, tag, comm_.handle(), &requests.emplace_back());
+      }
     MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
     Kokkos::deep_copy(to.message, to.host);
   }

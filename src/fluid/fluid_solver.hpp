@@ -204,6 +204,8 @@ class FluidSolver {
     double mass = -1;   // of the present step
     bool stale = true;  // the cycle is of another step's mass or other node kinds
     Components<float> r, shadow, p, v, t;
+    Kokkos::View<Sums<2>, Memory> two{"corpuscle::fluid::sums"};
+    HostCopy<Kokkos::View<Sums<2>, Memory>> two_host{two};
   };
   std::unique_ptr<Momentum> momentum_;
   std::unique_ptr<PressureCycle> pressure_cycle_;    // preconditioner of both

@@ -57,12 +57,16 @@ class FluidSolver::Correction {
   }
   std::array<double, 2> apply_r() {
     apply(m_.r, m_.t);
-    return sums(part(m_.t, m_.r), part(m_.t, m_.t));
+    scaled_dots(index_, finest_.views.inverse, m_.t, m_.r, m_.two);
+    return sums();
   }
-  double advance_v(double alpha) { return f_.grid_->comm().sum(advance(alpha, m_.v)); }
+  double advance_v(double alpha) {
+    advance_velocity(index_, finest_.views.inverse, alpha, finest_.x, m_.v, m_.shadow, f_.u_, m_.r, m_.two);
+    return sums()[0];
+  }
   std::array<double, 2> advance_t(double omega) {
-    const double square = advance(omega, m_.t);
-    return sums(square, part(m_.shadow, m_.r));
+    advance_velocity(index_, finest_.views.inverse, omega, finest_.x, m_.t, m_.shadow, f_.u_, m_.r, m_.two);
+    return sums();
   }
   void next_p(double beta, double w) { next_direction(index_, beta, w, m_.r, m_.v, m_.p); }
 
@@ -81,16 +85,14 @@ class FluidSolver::Correction {
     }
     f_.with_operator([&](const auto& a) { apply_momentum(a, finest_.views.inverse, direction, image); });
   }
-  double advance(double factor, const Components<float>& image) {
-    return advance_velocity(index_, finest_.views.inverse, factor, finest_.x, image, f_.u_, m_.r);
-  }
   double part(const Components<float>& a, const Components<float>& b) const {
     return scaled_dot(index_, finest_.views.inverse, a, b);
   }
-  std::array<double, 2> sums(double a, double b) const {
-    std::array<double, 2> both{a, b};
-    f_.grid_->comm().sum(both.data(), 2);
-    return both;
+  /// Over all ranks.
+  std::array<double, 2> sums() const {
+    Sums<2> both = m_.two_host.read()();
+    f_.grid_->comm().sum(both.value, 2);
+    return {both[0], both[1]};
   }
   double dot(const Components<float>& a, const Components<float>& b) const {
     return f_.grid_->comm().sum(part(a, b));

@@ -75,8 +75,14 @@ void MultigridCycle<Field>::update() {
 
 template <class Field>
 template <class Body>
-void MultigridCycle<Field>::pass(const char* step, const Level& level, const Body& body) {
-  for_owned_rounded(cycle_label<Field>(step), level.views.index, body);
+void MultigridCycle<Field>::pass(const char* step, std::size_t number, const Body& body, const Field& result) {
+  const IndexSpace& index = levels_[number].views.index;
+  Halo& halo = hierarchy_->levels()[number].halo;
+  const WithImages<Body, Field> whole{body, index, {halo.wraps(0), halo.wraps(1), halo.wraps(2)}, result};
+  if (whole.wraps[0] || whole.wraps[1] || whole.wraps[2])
+    for_owned_rounded(cycle_label<Field>(step), index, whole);
+  else
+    for_owned_rounded(cycle_label<Field>(step), index, body);
 }
 
 template <class Field>
@@ -86,10 +92,10 @@ void MultigridCycle<Field>::smooth_down(std::size_t number) {
   halo.exchange(level.b, 1);
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   const auto first = steps.next(), second = steps.next();
-  pass("smooth_from_zero", level, SmoothFromZero<Field>(level.views, first, second, level.b, level.y, level.x));
+  pass("smooth_from_zero", number, SmoothFromZero<Field>(level.views, first, second, level.b, level.y, level.x), level.x);
   for (int n = 2; n < smoothing_.steps; ++n) {
-    halo.exchange(level.x, 1);
-    pass("smooth", level, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y));
+    halo.exchange_with_others(level.x, 1);
+    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y);
     std::swap(level.x, level.y);
   }
 }
@@ -99,10 +105,16 @@ void MultigridCycle<Field>::smooth_up(std::size_t number) {
   Level& level = levels_[number];
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   for (int n = 0; n < smoothing_.steps; ++n) {
-    hierarchy_->levels()[number].halo.exchange(level.x, 1);
-    pass("smooth", level, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y));
+    hierarchy_->levels()[number].halo.exchange_with_others(level.x, 1);
+    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y);
     std::swap(level.x, level.y);
   }
+}
+
+template <class Field>
+void MultigridCycle<Field>::run(int depth) {
+  descend(0, depth);
+  if (levels_.size() == 1 && solve_coarsest) hierarchy_->levels()[0].halo.exchange(levels_[0].x, 1);
 }
 
 template <class Field>
@@ -116,14 +128,14 @@ void MultigridCycle<Field>::descend(std::size_t number, int depth) {
     Halo& halo = hierarchy_->levels()[number].halo;
     Level& coarse = levels_[number + 1];
     auto& shared = hierarchy_->levels()[number + 1];
-    halo.exchange(level.x, 1);
-    pass("residual", level, LevelResidual<Field>{level.views, level.b, level.x, level.y});
-    if (level.views.split) halo.exchange(level.y, 1);
+    halo.exchange_with_others(level.x, 1);
+    pass("residual", number, LevelResidual<Field>{level.views, level.b, level.x, level.y}, level.y);
+    if (level.views.split) halo.exchange_with_others(level.y, 1);
     restrict_sums(level.views, coarse.views.index, level.y, coarse.b);
     if (shared.cells) shared.cells->run(coarse.b);
     descend(number + 1, depth - 1);
     if (level.views.split) shared.halo.exchange(coarse.x, 1);
-    pass("prolong", level, AddCorrection<Field>(level.views, coarse.views.index, coarse.x, level.x));
+    pass("prolong", number, AddCorrection<Field>(level.views, coarse.views.index, coarse.x, level.x), level.x);
   }
   smooth_up(number);
 }

@@ -30,8 +30,8 @@ class MultigridCycle {
   /// Diagonals of all levels from the finest one's `own`, after the hierarchy's update.
   void update();
   /// x = one cycle for b, on the finest level, with `depth` coarser ones at most; x must be zero beyond physical sides.
-  /// b's halo need not be valid, and x's is not afterwards.
-  void run(int depth) { descend(0, depth); }
+  /// b's halo need not be valid; of x's what comes from this rank itself is afterwards, as far as an operator reaches it.
+  void run(int depth);
 
   std::vector<Level>& levels() { return levels_; }
   /// The coarsest level, from now on, instead of smoothing it; together with the other small ones. Shared.
@@ -41,7 +41,7 @@ class MultigridCycle {
 
  private:
   template <class Body>
-  static void pass(const char* step, const Level& level, const Body& body);
+  void pass(const char* step, std::size_t number, const Body& body, const Field& result);
   void find_small_levels();
   void run_small(int depth);
   void descend(std::size_t number, int depth);

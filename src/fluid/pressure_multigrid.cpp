@@ -16,8 +16,12 @@ PressureMultigrid::PressureMultigrid(MultigridHierarchy& hierarchy, PressureCycl
     coefficient_[d] = coefficient[d];
     operator_.conductance[d] = Array<double>("corpuscle::multigrid::conductance", index.size());
   }
-  for (auto* vector : {&operator_.diagonal, &operator_.inverse, &p_, &q_, &r_})
+  for (auto* vector : {&operator_.diagonal, &operator_.inverse, &p_, &s_, &w_, &r_})
     *vector = Array<double>("corpuscle::multigrid::vector", index.size());
+  products_ = Kokkos::View<Sums<CgProducts::count>, Memory>("corpuscle::multigrid::products");
+  products_host_ = HostCopy(products_);
+  state_ = Kokkos::View<CgState, Memory>("corpuscle::multigrid::state");
+  state_host_ = HostCopy(state_);
 }
 
 void PressureMultigrid::update(const PressureMask& mask) {
@@ -38,22 +42,32 @@ KrylovResult PressureMultigrid::solve(const Array<double>& rhs, const Array<doub
     result.converged = norm == 0;
     return result;
   }
-  // The cycle sees residuals of order one: single precision has no room for very small ones.
-  double scale = 1 / norm;
-  spread_scalar(index, scale, rhs, finest.b);
   const double tolerance = std::max(absolute_tolerance, least_reduction * norm);
-  double rz = 1;
-  while (norm > tolerance && result.iterations < max_iterations_ && std::isfinite(norm)) {
+  // The cycle sees residuals of order one: single precision has no room for very small ones.
+  CgState state;
+  state.scale = state.next_scale = 1 / norm;
+  state.norm = norm, state.tolerance = tolerance, state.most = max_iterations_;
+  state.done = !(norm > tolerance);
+  spread_scalar(index, state.next_scale, rhs, finest.b);
+  for (const auto& vector : {p_, s_}) Kokkos::deep_copy(Exec(), vector, 0.0);
+  if (!look_always) state_host_.set(state);
+  for (int n = 1; !state.done; ++n) {
     cycle_->run();
-    const double next = comm_.sum(owned_dot(index, r_, finest.x)) / scale;
-    new_direction(index, result.iterations == 0 ? 0.0 : next / rz, 1 / scale, finest.x, p_);
-    rz = next;
-    halo_->exchange(p_, 1);
-    const double alpha = rz / comm_.sum(apply_and_dot(operator_, p_, q_));
-    scale = 1 / norm;
-    norm = std::sqrt(comm_.sum(advance_and_norm(index, alpha, scale, p_, q_, x, r_, finest.b)));
-    ++result.iterations;
+    halo_->exchange_with_others(finest.x, 1);
+    cg_products(operator_, finest.x, r_, s_, w_, products_);
+    if (look_always || comm_.size() > 1) {
+      auto products = products_host_.read()();
+      comm_.sum(products.value, CgProducts::count);
+      state = cg_step(state, products);
+      cg_advance(index, CgByValue{state}, finest.x, w_, p_, s_, x, r_, finest.b);
+    } else {
+      cg_step_on_device(products_, state_);
+      cg_advance(index, CgOnDevice{state_}, finest.x, w_, p_, s_, x, r_, finest.b);
+      if (n + 1 >= last_iterations_) state = state_host_.read()();
+    }
   }
+  result.iterations = last_iterations_ = state.iterations;
+  norm = state.norm;
   result.converged = norm <= tolerance;
   return result;
 }

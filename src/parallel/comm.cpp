@@ -1,6 +1,7 @@
 #include "parallel/comm.hpp"
 
 #include "common/extremes.hpp"
+#include "parallel/traffic.hpp"
 
 namespace corpuscle {
 
@@ -29,13 +30,19 @@ MPI_Op keeping_max() {
 Comm Comm::alone() { return Comm(MPI_COMM_SELF); }
 
 void Comm::sum(double* values, int n) const {
-  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm_);
+  if (size_ == 1) return;
+  ++traffic().reductions;
+  MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, MPI_SUM, comm_);
 }
 void Comm::max(double* values, int n) const {
-  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, keeping_max(), comm_);
+  if (size_ == 1) return;
+  ++traffic().reductions;
+  MPI_Allreduce(MPI_IN_PLACE, values, n, MPI_DOUBLE, keeping_max(), comm_);
 }
 long Comm::sum(long value) const {
-  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_LONG, MPI_SUM, comm_);
+  if (size_ == 1) return value;
+  ++traffic().reductions;
+  MPI_Allreduce(MPI_IN_PLACE, &value, 1, MPI_LONG, MPI_SUM, comm_);
   return value;
 }
 void Comm::barrier() const {

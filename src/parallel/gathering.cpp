@@ -1,5 +1,7 @@
 #include "parallel/gathering.hpp"
 
+#include "parallel/traffic.hpp"
+
 namespace corpuscle {
 
 namespace {
@@ -52,6 +54,7 @@ void Gathering::gather(const Field& field, int components) {
   if (buffer_host_.data() != buffer_.data()) Kokkos::deep_copy(buffer_host_, buffer_);
   Exec().fence();
 #ifdef CORPUSCLE_MPI
+  for (int rank = 1; rank < comm_.size(); ++rank) traffic().sent(static_cast<long>(sent_[comm_.rank()]) * sizeof(float));
   MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, buffer_host_.data(), sent_.data(), at_.data(), MPI_FLOAT, comm_.handle());
 #endif
   if (buffer_host_.data() != buffer_.data()) Kokkos::deep_copy(buffer_, buffer_host_);

@@ -1,6 +1,7 @@
 #include "parallel/halo.hpp"
 
 #include "core/error.hpp"
+#include "parallel/traffic.hpp"
 
 #include <fmt/format.h>
 
@@ -61,9 +62,11 @@ void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neig
       MPI_Irecv(field.data() + static_cast<std::size_t>(m) * index.size() + filled[side], bytes, MPI_BYTE, neighbour[side],
                 2 * m + 1 - side, comm.handle(), &request[pending++]);
   for (int side = 0; side < 2; ++side)
-    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
+    for (int m = 0; m < components && neighbour[side] >= 0; ++m) {
+      traffic().sent(bytes);
       MPI_Isend(field.data() + static_cast<std::size_t>(m) * index.size() + sent[side], bytes, MPI_BYTE, neighbour[side],
                 2 * m + side, comm.handle(), &request[pending++]);
+    }
   MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
 }
 #endif
@@ -138,22 +141,23 @@ bool Halo::shared() const {
 }
 
 template <class Field>
-void Halo::run(const Field& field, int layers) {
+void Halo::run(const Field& field, int layers, bool own_too) {
   using Value = typename Field::non_const_value_type;
   [[maybe_unused]] const int components = Field::rank == 1 ? 1 : static_cast<int>(field.extent(1));
   // What comes from this rank itself, along directions that follow each other, in one go.
   CellBoxes within;
-  std::array<bool, 3> wraps{};
+  std::array<bool, 3> around{};
   const auto copy_within = [&] {
-    copy_around_periods(index_, within, wraps, field);
-    within = {}, wraps = {};
+    copy_around_periods(index_, within, around, field);
+    within = {}, around = {};
   };
   for (int d = 0; d < 3; ++d) {
     const int low = neighbour_[d][0], high = neighbour_[d][1];
     if (low < 0 && high < 0) continue;
-    if (low == comm_.rank() && high == comm_.rank()) {
+    if (wraps(d)) {
+      if (!own_too) continue;
       for (int side = 0; side < 2; ++side) within.add(slab(index_, d, side, true, layers));
-      wraps[d] = true;
+      around[d] = true;
       continue;
     }
     copy_within();
@@ -178,6 +182,7 @@ void Halo::run(const Field& field, int layers) {
       pack_box(index_, box, field, buffer);
       if (send_host_[side].data() != send_[side].data()) Kokkos::deep_copy(send_host_[side], send_[side]);
       Exec().fence();
+      traffic().sent(static_cast<long>(box.size()) * components * sizeof(Value));
       MPI_Isend(send_host_[side].data(), box.size() * components * static_cast<int>(sizeof(Value)), MPI_BYTE,
                 neighbour_[d][side], side, comm_.handle(), &request[pending++]);
     }
@@ -195,13 +200,13 @@ void Halo::run(const Field& field, int layers) {
   copy_within();
 }
 
-template void Halo::run(const Components<double>&, int);
-template void Halo::run(const Array<double>&, int);
-template void Halo::run(const Components<float>&, int);
-template void Halo::run(const Array<float>&, int);
-template void Halo::run(const Array<int>&, int);
-template void Halo::run(const Array<unsigned long long>&, int);
-template void Halo::run(const Array<NodeKind>&, int);
-template void Halo::run(const Array<std::int8_t>&, int);
+template void Halo::run(const Components<double>&, int, bool);
+template void Halo::run(const Array<double>&, int, bool);
+template void Halo::run(const Components<float>&, int, bool);
+template void Halo::run(const Array<float>&, int, bool);
+template void Halo::run(const Array<int>&, int, bool);
+template void Halo::run(const Array<unsigned long long>&, int, bool);
+template void Halo::run(const Array<NodeKind>&, int, bool);
+template void Halo::run(const Array<std::int8_t>&, int, bool);
 
 }  // namespace corpuscle

@@ -27,6 +27,13 @@ class Halo {
   void exchange(const Field& field, int layers = IndexSpace::halo) {
     run(field, layers);
   }
+  /// Of those that come from other ranks alone: what is at the other end of a period of this rank's is left to the caller.
+  template <class Field>
+  void exchange_with_others(const Field& field, int layers) {
+    run(field, layers, false);
+  }
+  /// Whether this rank is its own neighbour along direction d.
+  bool wraps(int d) const { return neighbour_[d][0] == comm_.rank() && neighbour_[d][1] == comm_.rank(); }
   /// Whether any layer is filled: it is not on a rank alone without periodic directions.
   bool shared() const;
 
@@ -35,7 +42,7 @@ class Halo {
 
  private:
   template <class Field>
-  void run(const Field& field, int layers);
+  void run(const Field& field, int layers, bool own_too = true);
 
   Comm comm_;
   IndexSpace index_;

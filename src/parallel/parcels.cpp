@@ -1,6 +1,7 @@
 #include "parallel/parcels.hpp"
 
 #include "core/error.hpp"
+#include "parallel/traffic.hpp"
 
 namespace corpuscle {
 
@@ -27,8 +28,10 @@ Parcels exchange_parcels(const Comm& comm, const Parcels& outgoing) {
     MPI_Irecv(bytes.data(), received[rank], MPI_BYTE, rank, tag, comm.handle(), &requests.emplace_back());
   }
   for (const auto& [rank, bytes] : outgoing)
-    if (rank != comm.rank() && !bytes.empty())
+    if (rank != comm.rank() && !bytes.empty()) {
+      traffic().sent(sent[rank]);
       MPI_Isend(bytes.data(), sent[rank], MPI_BYTE, rank, tag, comm.handle(), &requests.emplace_back());
+    }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
 #endif
   return incoming;

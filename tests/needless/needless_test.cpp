@@ -172,6 +172,28 @@ Case bare_capsule(std::vector<std::string> overrides) {
 
 }  // namespace
 
+TEST_CASE("a step launches no more kernels than it needs", "[needless]") {
+  // With the whole multigrid below 8192 cells in one launch, periodic halos in one, and one reduction for an iteration of each solver. The
+  // bounds leave room for two iterations of the pressure's solver more.
+  const auto [name, overrides, step, launches, reductions] =
+      GENERATE(std::tuple{"straight_tube", std::vector<std::string>{"time.step_us=4", "time.first_step_us=4"}, 6, 330, 45},
+               std::tuple{"blood_tube", std::vector<std::string>{"time.step_us=10", "time.first_step_us=10"}, 4, 400, 75});
+  std::vector<std::string> settings = overrides;
+  settings.insert(settings.end(), {"time.end_us=1000", "output.history_every_us=0"});
+  Timers timers(false);
+  FlowSimulation simulation(Comm(), read_case(case_file(name), settings), timers);
+  for (int n = 0; n < step; ++n) simulation.step();
+  Recorder recorder;
+  recorder.start();
+  simulation.step();
+  recorder.stop();
+  INFO(name << ": " << Recorder::launches() << " launches, " << Recorder::reductions() << " reductions");
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(name << ": " << Recorder::launches() << " launches, " << Recorder::reductions() << " reductions");
+  CHECK(Recorder::launches() <= launches);
+  CHECK(Recorder::reductions() <= reductions);
+  CHECK(Recorder::launches() > 50);
+}
+
 TEST_CASE("what is left out would have cost what the program says", "[needless]") {
   const auto check = [](const char* module, const std::vector<std::string>& labels, const Case& without,
                         const Case& with) {

@@ -14,11 +14,12 @@ class Recorder {
  public:
   void start() {
     kernels().clear();
+    reductions() = 0;
     allocations().clear();
     bytes().clear();
     namespace hooks = Kokkos::Tools::Experimental;
     hooks::set_begin_parallel_for_callback(launch);
-    hooks::set_begin_parallel_reduce_callback(launch);
+    hooks::set_begin_parallel_reduce_callback(reduce);
     hooks::set_begin_parallel_scan_callback(launch);
     hooks::set_allocate_data_callback(allocate);
   }
@@ -40,6 +41,13 @@ class Recorder {
     return counts;
   }
 
+  /// Launches that end in a number, and all.
+  static int& reductions() {
+    static int count = 0;
+    return count;
+  }
+  static int launches() { return matching(kernels(), ""); }
+
   /// Bytes of the memory that kernels use, by view label: not those of copies that the host reads.
   static std::map<std::string, int>& bytes() {
     static std::map<std::string, int> counts;
@@ -56,6 +64,7 @@ class Recorder {
 
  private:
   static void launch(const char* label, std::uint32_t, std::uint64_t*) { ++kernels()[label]; }
+  static void reduce(const char* label, std::uint32_t, std::uint64_t*) { ++kernels()[label], ++reductions(); }
   static void allocate(Kokkos::Tools::SpaceHandle space, const char* label, const void*, std::uint64_t size) {
     ++allocations()[label];
     if (std::strcmp(space.name, Kokkos::DefaultExecutionSpace::memory_space::name()) == 0) bytes()[label] += static_cast<int>(size);
