@@ -40,7 +40,6 @@ void ForceCoupling::refuse_long_steps() {
   if (longest <= stable_us_) return;
   // What the fluid resists depends on the step: viscous membranes stand somewhat less in steps as long as this one allows.
   constexpr int rounds = 6;
-  const std::string cell = least_stable_;
   double allowed = stable_us_;
   for (int n = 0; n < rounds && membranes_->viscosity() && !packed_; ++n) {
     measure_stability(allowed);
@@ -50,7 +49,7 @@ void ForceCoupling::refuse_long_steps() {
   throw InputError(
       fmt::format("time.step_us: steps of {:.5g} us are too long for these membranes, which move with the fluid: above about "
                   "{} us{} {} would swing and grow. Reduce time.step_us{}",
-                  longest, rounded_down(allowed), scene_.coupling->slip ? " with the slip correction" : "", cell.empty() ? "they" : cell,
+                  longest, rounded_down(allowed), scene_.coupling->slip ? " with the slip correction" : "", least_stable_.empty() ? "they" : least_stable_,
                   scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 

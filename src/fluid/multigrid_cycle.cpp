@@ -1,6 +1,7 @@
 #include "fluid/multigrid_cycle.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 #include <type_traits>
 #include <utility>
 
@@ -36,6 +37,8 @@ MultigridCycle<Field>::MultigridCycle(MultigridHierarchy& hierarchy, const Smoot
 template <class Field>
 void MultigridCycle<Field>::find_small_levels() {
   using Small = SmallLevels<Field>;
+  static_assert(sizeof(Small) < 4000);  // it goes along with the launch
+  if (smoothing_.steps > Small::most_steps) throw std::logic_error("multigrid: more smoothing steps than small levels have room for");
   const auto& shared = hierarchy_->levels();
   const auto is_small = [&](std::size_t l) {
     return shared[l].comm.size() == 1 && levels_[l].views.index.owned() <= Small::most_cells && levels_.size() - l <= Small::most;
@@ -48,6 +51,12 @@ void MultigridCycle<Field>::find_small_levels() {
     const Level& level = levels_[l];
     small_.level[l - first_small_] = {level.views, level.b, level.x, level.y};
   }
+}
+
+template <class Field>
+void MultigridCycle<Field>::solve_directly(const DirectLevel& coarsest) {
+  if (first_small_ == levels_.size()) throw std::logic_error("multigrid: a level that is solved directly must be small and one rank's alone");
+  small_.coarsest = coarsest, direct_ = true;
 }
 
 template <class Field>
@@ -129,7 +138,7 @@ void MultigridCycle<Field>::descend(std::size_t number, int depth) {
     Level& coarse = levels_[number + 1];
     auto& shared = hierarchy_->levels()[number + 1];
     halo.exchange_with_others(level.x, 1);
-    pass("residual", number, LevelResidual<Field>{level.views, level.b, level.x, level.y}, level.y);
+    for_owned_rounded(cycle_label<Field>("residual"), level.views.index, LevelResidual<Field>{level.views, level.b, level.x, level.y});
     if (level.views.split) halo.exchange_with_others(level.y, 1);
     restrict_sums(level.views, coarse.views.index, level.y, coarse.b);
     if (shared.cells) shared.cells->run(coarse.b);

@@ -34,8 +34,10 @@ class MultigridCycle {
   void run(int depth);
 
   std::vector<Level>& levels() { return levels_; }
+  /// Those that are done in one go, as the last run() had them.
+  const SmallLevels<Field>& small_levels() const { return small_; }
   /// The coarsest level, from now on, instead of smoothing it; together with the other small ones. Shared.
-  void solve_directly(const DirectLevel& coarsest) { small_.coarsest = coarsest, direct_ = true; }
+  void solve_directly(const DirectLevel& coarsest);
   /// Solves the coarsest level, x for b, where that is neither smoothed nor solved directly.
   std::function<void(Level&)> solve_coarsest;
 

@@ -26,6 +26,7 @@ class PressureCycle {
   void raise() { coarsest_->raise(); }
 
   Cycle::Level& finest() { return cycle_.levels()[0]; }
+  const SmallLevels<Array<CycleReal>>& small_levels() const { return cycle_.small_levels(); }
 
  private:
   Cycle cycle_;

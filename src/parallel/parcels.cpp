@@ -19,6 +19,7 @@ Parcels exchange_parcels(const Comm& comm, const Parcels& outgoing) {
     if (rank != comm.rank()) sent[rank] = static_cast<int>(bytes.size());
   }
   if (comm.max(too_long) > 0) throw ComputationError("cells: a message between two ranks has more than 2 GB: use more ranks");
+  ++traffic().reductions;
   MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm.handle());
   std::vector<MPI_Request> requests;
   for (int rank = 0; rank < comm.size(); ++rank) {

@@ -1,5 +1,7 @@
 #include "parallel/rank_row.hpp"
 
+#include "parallel/traffic.hpp"
+
 namespace corpuscle {
 
 #ifdef CORPUSCLE_MPI
@@ -21,6 +23,7 @@ RankRow::~RankRow() {
 bool RankRow::add_up(int* starts, const int* changes, int n) {
   if (size_ == 1) return true;
   below_.assign(n, 0);  // what the lowest rank receives is left as it is
+  traffic().reductions += 2;
   MPI_Allreduce(MPI_IN_PLACE, starts, n, MPI_INT, MPI_SUM, row_);
   MPI_Exscan(changes, below_.data(), n, MPI_INT, MPI_SUM, row_);
   bool closed = true;

@@ -125,7 +125,14 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
     const auto on_ranks = data_set(folder / out / "cell_series.h5", "step_000000006/deformation");
     REQUIRE(on_ranks.size() == 18);
     for (int n = 0; n < 18; ++n) CHECK(on_ranks[n] == Approx(deformation[n]).margin(1e-9));
+    // A solve of the pressure alone takes some ten iterations, each with a joint reduction and a message to each neighbour.
+    const auto traffic = report(folder / out)["traffic"];
+    CHECK(traffic["reductions_per_step"].get<double>() > 10);
+    CHECK(traffic["reductions_per_step"].get<double>() < 400);
+    CHECK(traffic["messages_per_step"].get<double>() > 20);
+    CHECK(traffic["bytes_per_step"].get<double>() > 4 * traffic["messages_per_step"].get<double>());
   }
+  CHECK(!report(folder / "one").contains("traffic"));
 #endif
   // Stopped at 40 us and gone on from there: the same bits.
   succeed(folder, {"run", name, "--out", "parts", "--set", "time.end_us=40"}, {1, 1});

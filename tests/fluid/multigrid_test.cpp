@@ -116,6 +116,45 @@ TEST_CASE("the multigrid solve takes few iterations, with bodies, thin cells, od
   }
 }
 
+TEST_CASE("a team does small levels as one thread does", "[fluid]") {
+  const auto [cells, periodic] = GENERATE(std::pair<std::array<int, 3>, std::array<bool, 3>>{{12, 20, 24}, {false, false, true}},
+                                          std::pair<std::array<int, 3>, std::array<bool, 3>>{{13, 18, 20}, {true, true, false}});
+  Grid grid(Comm(), make_node_source(box(cells, {3, 5, 6})), periodic);
+  const IndexSpace index = grid.index();
+  ViscousCoefficients g;
+  for (auto& normal : g.normal) normal = Array<double>("corpuscle::test::normal", index.size());
+  viscous_coefficients<false>(grid.views(), g);
+  const PressureMask mask("corpuscle::test::mask", index.size()), outflow("corpuscle::test::outflow", index.size());
+  mark_pressure(grid.views().base_kind, outflow, mask);
+  MultigridHierarchy hierarchy(grid, g.normal);
+  hierarchy.update(mask);
+  PressureCycle cycle(hierarchy, std::make_unique<InverseCoarsest>(hierarchy));  // as on devices
+  cycle.update(index.cell(0, 0, 0));
+  const auto b = cycle.finest().b, x = cycle.finest().x;
+  for_owned("corpuscle::test::rhs", index, KOKKOS_LAMBDA(int i, int j, int k) { b(index.cell(i, j, k)) = std::sin(0.7f * i + 0.3f * j - 1.1f * k); });
+  cycle.run();
+  REQUIRE(cycle.small_levels().count > 1);
+  const Array<CycleReal> alone("corpuscle::test::alone", index.size());
+  Kokkos::deep_copy(alone, x);
+  Kokkos::deep_copy(x, CycleReal(0));
+  const auto s = cycle.small_levels();
+  using Team = Kokkos::TeamPolicy<Exec>;
+  Kokkos::parallel_for("corpuscle::test::team", Team(1, Kokkos::AUTO),
+                       KOKKOS_LAMBDA(const Team::member_type& team) { cycle_small_levels(TeamCells<Team::member_type>{team}, s); });
+  double most = 0, size = 0;
+  const auto one = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), alone), all = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
+  for (int k = 0; k < index.n[2]; ++k)
+    for (int j = 0; j < index.n[1]; ++j)
+      for (int i = 0; i < index.n[0]; ++i) {
+        const int c = index.cell(i, j, k);
+        most = larger(most, std::abs(double(one(c)) - all(c))), size = larger(size, std::abs(double(one(c))));
+      }
+  for (int d = 0; d < 3; ++d)
+    if (index.periodic[d]) CHECK(all(index.cell(0, 0, 0) + index.n[d] * index.stride(d)) == all(index.cell(0, 0, 0)));
+  CHECK(size > 0);
+  CHECK(most < 1e-5 * size);  // single precision
+}
+
 TEST_CASE("a solve whose outcome is looked at late has the same answer", "[fluid]") {
   Grid grid(Comm(), make_node_source(box({24, 20, 32}, {6, 5, 8})), {false, false, true});
   const IndexSpace index = grid.index();

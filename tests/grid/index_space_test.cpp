@@ -38,6 +38,28 @@ TEST_CASE("who adds up a sum does not change its bits") {
   CHECK(sum_owned("corpuscle::test::sum", index, body) == by_all);
 }
 
+TEST_CASE("every cell of boxes is visited once, by lines and by numbers") {
+  CellBoxes boxes;
+  boxes.add({{-2, 0, 1}, {5, 3, 4}});
+  boxes.add({{0, 0, 0}, {0, 9, 9}});  // empty
+  boxes.add({{-2, 3, 1}, {-1, 6, 4}});
+  boxes.add({{-2, 0, 4}, {5, 6, 5}});
+  REQUIRE(boxes.count == 3);
+  CHECK(boxes.size() == 63 + 9 + 42);
+  const auto at = [](int i, int j, int k) { return (i + 2) + 7 * (j + 6 * (k - 1)); };
+  Array<int> by_lines("corpuscle::test::visits", 7 * 6 * 4), by_numbers("corpuscle::test::visits", 7 * 6 * 4);
+  for_boxes("corpuscle::test::boxes", boxes, KOKKOS_LAMBDA(int b, int i, int j, int k) { by_lines(at(i, j, k)) += b + 1; });
+  for (int e = 0; e < boxes.size(); ++e) boxes.visit(e, [&](int b, int i, int j, int k) { by_numbers(at(i, j, k)) += b + 1; });
+  int wrong = 0;
+  for (int k = 1; k < 5; ++k)
+    for (int j = 0; j < 6; ++j)
+      for (int i = -2; i < 5; ++i) {
+        const int box = k == 4 ? 3 : j < 3 ? 1 : i < -1 ? 2 : 0;
+        wrong += by_lines(at(i, j, k)) != box || by_numbers(at(i, j, k)) != box;
+      }
+  CHECK(wrong == 0);
+}
+
 TEST_CASE("every cell of a box is visited once, whatever its size") {
   for (const int side : {1, 3, 12, 13, 31}) {
     Array<int> visits("corpuscle::test::visits", side * (side + 1) * (side + 2));
