@@ -310,7 +310,7 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const bool ratios = any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 4 * 24 + 1 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
   const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
-  const double conjugate_gradients = size.skewed ? 0 : 8 * 8;           // PressureMultigrid
+  const double conjugate_gradients = size.skewed ? 0 : 9 * 8;           // PressureMultigrid
   const double rows = 19;
   // PressureSolver: values, slots, packed, columns, numbers; hypre's matrix, once more while it takes the values; the
   // vectors of flexible GMRES, two for each of up to 60 iterations.
