@@ -11,8 +11,8 @@ namespace corpuscle {
 void check_prescribed_flow(const Grid& grid, const std::vector<BoundarySettings>& boundaries);
 
 /// What walls that move past the opposite side strain the fluid between them by in a step, and with it the cells.
-/// @param viscous  some membranes are: long steps follow these less well (2 um of area of 132 where 0.15 were strained by in a step, of first
-///                 order; 0.3 % where 0.03 were)
+/// @param viscous  some membranes are: long steps follow these less well (a red cell of 5e-7 N s/m had 3 % too much area where a step
+///                 strained it by 0.12, 1 % off by 0.084, 0.2 % by 0.03)
 /// @returns the warning, of more than 0.5, or 0.1 of viscous ones, or ""
 /// @throws InputError  beyond 2: a cell is torn before the next forces on it
 std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettings>& boundaries, double step_us, bool viscous = false);

@@ -48,8 +48,9 @@ void warn_of_free_fluid(const Case& scene) {
        1e3 * gradient / scene.fluid->density_pg_per_um3);
 }
 
+/// Warns of cells that are to start drawn out to another volume.
 /// @throws InputError  for cells drawn out so far that the first step would find their area senseless
-void refuse_stretched(const Comm& comm, const Case& scene, Membranes& membranes) {
+void check_stretches(const Comm& comm, const Case& scene, Membranes& membranes) {
   constexpr double unlike = 0.02;
   for (std::size_t c = 0; c < scene.cells.size(); ++c) {
     const Triple& s = scene.cells[c].start_stretch;
@@ -97,7 +98,7 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
     if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back(), viscous); !text.empty()) warn("{}", text);
   }
   if (!membranes()) return;
-  refuse_stretched(comm, scene, *membranes());
+  check_stretches(comm, scene, *membranes());
   membranes()->limit_area(Membranes::senseless_area);
   membranes()->limit_volume(Membranes::senseless_volume);
 }

@@ -201,7 +201,7 @@ TEST_CASE("a refusal tells the step that is taken then, and which cell asks for 
     return std::stod(text.substr(text.find("above about") + 12));
   };
   const double most = told(1e5);
-  CHECK(told(2 * most) == Approx(most).epsilon(0.02));
+  CHECK(told(2 * most) == Approx(most).epsilon(0.02));  // of three digits; the search comes from above and ends where it is sound
   told(1.02 * most);
   scene.time = {most, most};
   CHECK(refusal(scene) == "accepted");
