@@ -32,50 +32,78 @@ KOKKOS_INLINE_FUNCTION bool within_two_rings(const SurfaceSet& s, int v, int t) 
   return false;
 }
 
+/// Where the gaps of other ranks' vertices are asked for, um.
+struct GapsWanted {
+  static constexpr double far = 1e300;
+  Vec3 lower{-far, -far, -far}, upper{far, far, far};
+
+  bool everywhere() const { return upper.x == far; }
+
+  KOKKOS_INLINE_FUNCTION bool at(const Vec3& p) const {
+    for (int d = 0; d < 3; ++d)
+      if (p[d] < lower[d] || p[d] > upper[d]) return false;
+    return true;
+  }
+};
+
 /// What the search of lists reads.
 struct ContactSearch {
   SurfaceSet surface;
   Images images;
   TriangleBins bins;
+  TriangleSpheres spheres;  // in the order of the bins
   ContactRest rest;
   ContactReach reach;  // with the skin
+  GapsWanted wanted;
 
-  /// Whether a triangle under an image, whose vertices are at k, is one of vertex v's, which is at p.
-  KOKKOS_INLINE_FUNCTION bool belongs(int v, const Vec3& p, int m, int t) const {
+  /// Whether a triangle of vertex v's own body is far from it along the surface.
+  KOKKOS_INLINE_FUNCTION bool is_apart(int v, int t) const {
     const SurfaceSet& s = surface;
-    const int body = s.vertex_body(v), other = s.triangle_body(t);
+    const Vec3 here = rest.at(s, v);
+    Vec3 at[3];
+    for (int k = 0; k < 3; ++k) {
+      at[k] = rest.at(s, s.triangle(t, k));
+      const Vec3 way = at[k] - here;
+      if (dot(way, way) < reach.apart * reach.apart) return false;  // nearly all, and cheap
+    }
+    return distance_to(here, {at[0], at[1], at[2]}) >= reach.apart && !within_two_rings(s, v, t);
+  }
+
+  /// Whether a triangle under an image, whose place is within the farthest reach, is one of vertex v's, which is at p.
+  /// @param least  what meets copies alone is left to other ranks
+  KOKKOS_INLINE_FUNCTION bool belongs(int v, const Vec3& p, int m, int place, bool least) const {
+    const SurfaceSet& s = surface;
+    const int t = bins.order(place), body = s.vertex_body(v), other = s.triangle_body(t);
     const bool own = m == 0 && body == other;
     if (!own && body >= s.cells && other >= s.cells) return false;
     if (own && body >= s.cells) return false;
-    const Corners k = corners(s, t, {});
-    const double far = own ? reach.own : reach.other, most = far + bins.radius;
-    const Vec3 from_centre = p - centre_of(k);
-    if (dot(from_centre, from_centre) > most * most || distance_to(p, k) > far) return false;
-    if (!own) return true;
-    if (within_two_rings(s, v, t)) return false;
-    const Corners at_rest{rest.at(s, s.triangle(t, 0)), rest.at(s, s.triangle(t, 1)), rest.at(s, s.triangle(t, 2))};
-    return distance_to(rest.at(s, v), at_rest) >= reach.apart;
+    if (least && other >= s.own_cells) return false;
+    const double far = own ? reach.own : reach.other;
+    if (own && !(spheres.may_reach(place, p, far) && is_apart(v, t))) return false;
+    return distance_to(p, corners(s, t, {})) <= far;
   }
 
   /// use(item) for all of vertex v's items, in no particular order.
   template <class Use>
   KOKKOS_INLINE_FUNCTION void visit(int v, const Use& use) const {
+    const double farthest = reach.own > reach.other ? reach.own : reach.other;
+    const Vec3 here = load(surface.x, v);
+    const bool least = surface.vertex_body(v) >= surface.own_cells && !wanted.at(here);
     for (int m = 0; m < images.count; ++m) {
-      const Vec3 p = load(surface.x, v) + images.shift[m];
+      const Vec3 p = here + images.shift[m];
       int low[3], high[3];
       bool near = true;
-      for (int d = 0; d < 3; ++d) {
-        low[d] = bins.along(d, p[d]) - 1;
-        high[d] = low[d] + 2;
-        low[d] = low[d] < 0 ? 0 : low[d];
-        high[d] = high[d] > bins.n[d] - 1 ? bins.n[d] - 1 : high[d];
-        near = near && low[d] <= high[d];
+      for (int d = 0; d < 3 && near; ++d) {
+        const int at = bins.along(d, p[d]);
+        low[d] = at - bins.around < 0 ? 0 : at - bins.around;
+        high[d] = at + bins.around > bins.n[d] - 1 ? bins.n[d] - 1 : at + bins.around;
+        near = low[d] <= high[d];
       }
       if (!near) continue;
       for (int k = low[2]; k <= high[2]; ++k)
         for (int j = low[1]; j <= high[1]; ++j)
           for (int e = bins.start(bins.bin(low[0], j, k)); e < bins.start(bins.bin(high[0], j, k) + 1); ++e)
-            if (belongs(v, p, m, bins.order(e))) use(m * surface.triangles + bins.order(e));
+            if (spheres.may_reach(e, p, farthest) && belongs(v, p, m, e, least)) use(m * surface.triangles + bins.order(e));
     }
   }
 };

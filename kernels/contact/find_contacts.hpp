@@ -98,34 +98,50 @@ KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bo
 
 /// Fills item, gap, weight and normal of the contacts, at the surfaces' present positions, for groups within reach
 /// (without the skin). What is found does not depend on what else is in the lists.
+/// @param spheres  of the present positions
+/// @param before   [group] items found with these lists before, or -1: what is nearest is seldom farther than they are
 inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts, const ContactReach& far,
-                          const ContactLists& lists, const ContactViews& contacts) {
+                          const TriangleSpheres& spheres, const Array<int>& before, const ContactLists& lists,
+                          const ContactViews& contacts) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const ContactReach reach = far;
+  const TriangleSpheres around = spheres;
+  const Array<int> last_item = before;
   const ContactLists in = lists;
   const ContactViews out = contacts;
   Kokkos::parallel_for(
       "corpuscle::contact::find_contacts", Policy(0, s.vertices), KOKKOS_LAMBDA(int v) {
         const Vec3 here = load(s.x, v);
         const int last = in.first_group(v + 1);
-        for (int g = in.first_group(v); g < last;) {
-          const int group = g, first = in.first_item(g);
-          const Vec3 p = here + images.shift[item_image(s, first)];
+        for (int next = in.first_group(v); next < last;) {
+          const int group = next, first = in.first_item(group), image = item_image(s, first);
+          const Vec3 p = here + images.shift[image];
+          const bool own = same_body(s, v, first);
+          const double most = own ? reach.own : reach.other;
+          double distance = most;  // no triangle that is farther is the nearest
+          if (last_item(group) >= 0) {
+            const double farthest = around.farthest(item_triangle(s, last_item(group)), p);
+            distance = farthest < most ? farthest : most;
+          }
           Nearest best;
-          for (; g < last && (g == group || same_group(s, first, in.first_item(g))); ++g) {
-            out.item(g) = -1;
-            for (int e = in.first(g); e < in.first(g + 1); ++e) {
-              const Corners k = corners(s, item_triangle(s, in.item(g, e)), {});
+          best.square = most * most;
+          for (; next < last && (next == group || same_group(s, first, in.first_item(next))); ++next) {
+            out.item(next) = -1;
+            for (int e = in.first(next); e < in.first(next + 1); ++e) {
+              const int t = in.item(next, e) - image * s.triangles;
+              if (!around.may_reach(t, p, distance)) continue;
+              const Corners k = corners(s, t, {});
               const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
               const Vec3 r = p - (at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c);
               const double square = dot(r, r);
-              if (square < best.square) best = {square, in.item(g, e), at};
+              if (!(square < best.square)) continue;
+              best = {square, in.item(next, e), at};
+              const double found = std::sqrt(square);
+              distance = found < distance ? found : distance;
             }
           }
-          const bool own = same_body(s, v, first);
-          const double most = own ? reach.own : reach.other;
-          if (best.square < most * most) store_contact(s, p, own, best, out, group);
+          if (best.item >= 0) store_contact(s, p, own, best, out, group);
         }
       });
 }

@@ -5,6 +5,7 @@
 #include "common/joined.hpp"
 #include "common/sums.hpp"
 #include "contact/contact_lists.hpp"
+#include "contact/smooth_motion.hpp"
 
 namespace corpuscle {
 
@@ -27,36 +28,46 @@ struct LongestWay : Joined<LongestWay> {
 
 /// Means over all vertices.
 struct MeanMotion {
-  Vec3 way, velocity;
+  Vec3 way, velocity;              // beyond a smooth motion
+  Vec3 whole_way, whole_velocity;  // with it
 };
 
 /// @param positions  [vertex, 3] um, from where ways are measured
 template <class Positions>
-MeanMotion mean_motion(const SurfaceSet& surface, const Positions& positions) {
+MeanMotion mean_motion(const SurfaceSet& surface, const Positions& positions, const MotionSince& together) {
   const SurfaceSet s = surface;
   const Positions listed = positions;
-  Sums<6> mean;
+  const MotionSince all = together;
+  Sums<12> mean;
   Kokkos::parallel_reduce(
       "corpuscle::contact::mean_way", Policy(0, s.vertices),
-      KOKKOS_LAMBDA(int v, Sums<6>& sum) {
+      KOKKOS_LAMBDA(int v, Sums<12>& sum) {
+        const Vec3 from{listed(v, 0), listed(v, 1), listed(v, 2)};
+        const Vec3 whole_way = load(s.x, v) - from, whole_velocity = load(s.v, v), way = whole_way - all.way(from),
+                   velocity = whole_velocity - all.velocity(from);
         for (int d = 0; d < 3; ++d) {
-          sum[d] += s.x(v, d) - listed(v, d);
-          sum[3 + d] += s.v(v, d);
+          sum[d] += way[d];
+          sum[3 + d] += velocity[d];
+          sum[6 + d] += whole_way[d];
+          sum[9 + d] += whole_velocity[d];
         }
       },
       mean);
   const double share = 1.0 / s.vertices;
-  return {share * Vec3{mean[0], mean[1], mean[2]}, share * Vec3{mean[3], mean[4], mean[5]}};
+  return {share * Vec3{mean[0], mean[1], mean[2]}, share * Vec3{mean[3], mean[4], mean[5]}, share * Vec3{mean[6], mean[7], mean[8]},
+          share * Vec3{mean[9], mean[10], mean[11]}};
 }
 
-/// Of all vertices, beyond the mean of all.
+/// Of all vertices.
 struct StepWays : Joined<StepWays> {
-  double whole = 0;  // um, from where the lists were made to where the present velocity brings a vertex in a step
-  LongestWay step;   // of that what one step may have made, or will
+  double whole = 0;  // um, beyond what all do together, from where the lists were made to where the present velocity brings a vertex in a step
+  double drift = 0;  // um, the same in space, with what all do together
+  LongestWay step;   // what one step may have made of `whole`, or will beyond the mean of all
 
   template <class Other>
   KOKKOS_INLINE_FUNCTION void join(const Other& b) volatile {
     whole = larger(whole, b.whole);
+    drift = larger(drift, b.drift);
     step.join(b.step);
   }
 };
@@ -64,19 +75,22 @@ struct StepWays : Joined<StepWays> {
 /// @param positions  [vertex, 3] um, where the lists were made
 /// @param skin       um: vertices had gone half of it at most before the last step
 template <class Positions>
-StepWays step_ways(const SurfaceSet& surface, const Positions& positions, double skin, double dt) {
+StepWays step_ways(const SurfaceSet& surface, const Positions& positions, const MotionSince& together, double skin, double dt) {
   const SurfaceSet s = surface;
   const Positions listed = positions;
-  const MeanMotion mean = mean_motion(surface, positions);
+  const MotionSince all = together;
+  const MeanMotion mean = mean_motion(surface, positions, together);
   StepWays ways;
   Kokkos::parallel_reduce(
       "corpuscle::contact::step_ways", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, StepWays& sum) {
-        const Vec3 from{listed(v, 0), listed(v, 1), listed(v, 2)};
-        const double behind = norm(load(s.x, v) - from - mean.way), ahead = dt * norm(load(s.v, v) - mean.velocity);
+        const Vec3 from{listed(v, 0), listed(v, 1), listed(v, 2)}, way = load(s.x, v) - from, velocity = load(s.v, v);
+        const double behind = norm(way - all.way(from) - mean.way);
         StepWays own;
-        own.whole = behind + ahead;
-        own.step.way = larger(behind - 0.5 * skin, ahead);
+        own.whole = behind + dt * norm(velocity - all.velocity(from) - mean.velocity);
+        own.drift = norm(way) + dt * norm(velocity);
+        const double beyond = behind - 0.5 * skin, since = norm(way - mean.whole_way);  // a flow that turns back brings nothing far
+        own.step.way = larger(since < beyond ? since : beyond, dt * norm(velocity - mean.whole_velocity));
         own.step.vertex = v;
         sum += own;
       },

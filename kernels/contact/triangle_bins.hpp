@@ -3,7 +3,7 @@
 
 #include "common/counting_sort.hpp"
 #include "common/joined.hpp"
-#include "immersed/views.hpp"
+#include "contact/triangle_spheres.hpp"
 
 namespace corpuscle {
 
@@ -22,17 +22,17 @@ struct TriangleBounds : Joined<TriangleBounds> {
 };
 
 struct TriangleBins {
+  static constexpr int around = 2;  // bins to either side, in which all is that is near
   int n[3] = {1, 1, 1};
   double lower[3] = {0, 0, 0}, width = 1;  // um
-  double radius = 0;                       // of the largest triangle
   Array<int> start;                        // [bin + 1] first of `order` in each bin
   Array<int> order;                        // [triangle] in each bin in the order of their numbers
 
   KOKKOS_INLINE_FUNCTION int count() const { return n[0] * n[1] * n[2]; }
   /// Bin along d, which may be outside.
   KOKKOS_INLINE_FUNCTION int along(int d, double x) const {
-    const double t = std::floor((x - lower[d]) / width);
-    return t < -2 ? -2 : (t > n[d] + 1 ? n[d] + 1 : static_cast<int>(t));
+    const double t = std::floor((x - lower[d]) / width), least = -1 - around, most = n[d] + around;
+    return static_cast<int>(t > least ? (t < most ? t : most) : least);  // what is no number as well
   }
   KOKKOS_INLINE_FUNCTION int bin(int i, int j, int k) const { return i + n[0] * (j + n[1] * k); }
   KOKKOS_INLINE_FUNCTION int bin_of(const Vec3& p) const {
@@ -44,8 +44,6 @@ struct TriangleBins {
     return bin(at[0], at[1], at[2]);
   }
 };
-
-KOKKOS_INLINE_FUNCTION Vec3 centre_of(const Corners& k) { return (1.0 / 3) * (k.a + k.b + k.c); }
 
 inline TriangleBounds bounds_of_triangles(const SurfaceSet& surface) {
   const SurfaceSet s = surface;

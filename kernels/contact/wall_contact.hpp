@@ -37,9 +37,34 @@ KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p
   return wall;
 }
 
+/// The shortest of the four links across a side around each of its cells.
+struct SideLinks {
+  int lower[2] = {}, cells[2] = {};  // of the lattice along the side
+  Array<float> length;               // [cell] um; empty where nothing is known
+
+  /// @param e, f  index coordinates along the side, clamped to it
+  KOKKOS_INLINE_FUNCTION double at(double e, double f) const {
+    const double along[2] = {e, f};
+    int cell[2];
+    for (int d = 0; d < 2; ++d) {
+      const double n = std::floor(along[d]) - lower[d];
+      cell[d] = static_cast<int>(n > 0 ? (n < cells[d] - 1 ? n : cells[d] - 1) : 0);
+    }
+    return length(cell[0] + cells[0] * cell[1]);
+  }
+  /// Whether gap_to_side() finds a point so many cells away far, whatever its map says: that costs more.
+  KOKKOS_INLINE_FUNCTION bool clear(double away, double e, double f, double reach) const {
+    constexpr double cells_at_walls = 4, between_nodes = 0.5;  // of a link, where the directions of the four differ
+    return length.extent(0) > 0 && away > cells_at_walls && away * between_nodes * at(e, f) > reach;
+  }
+};
+struct WallLinks {
+  SideLinks side[3][2];
+};
+
 /// The nearest of the walls within `reach` of a point that is at a marker or not far from it.
-KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSides& walls, const double (&eta)[3],
-                                            const Vec3& p, double reach) {
+KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSides& walls, const WallLinks& links,
+                                            const double (&eta)[3], const Vec3& p, double reach) {
   double xi[3];
   for (int d = 0; d < 3; ++d) {  // from walls half a cell away to walls at nodes of their own
     const double last = lattice.index.n[d] - 1;
@@ -51,6 +76,8 @@ KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSi
   for (int d = 0; d < 3; ++d)
     for (int end = 0; end < 2; ++end) {
       if (!walls.wall[d][end] || !(end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d])) continue;
+      const double away = end == 0 ? xi[d] + 1 : lattice.index.n[d] - xi[d];
+      if (links.side[d][end].clear(away, xi[(d + 1) % 3], xi[(d + 2) % 3], reach)) continue;
       const WallGap wall = gap_to_side(lattice, p, xi, d, end, reach);
       if (wall.gap < reach && wall.gap < nearest.gap) nearest = wall;
     }
@@ -80,6 +107,38 @@ inline double least_thickness(const Lattice& of_block, int d, int end) {
   return least;
 }
 
+inline SideLinks links_across(const Lattice& of_block, int d, int end) {
+  const Lattice lattice = of_block;
+  const int e = (d + 1) % 3, f = (d + 2) % 3;
+  SideLinks links{{lattice.lower[e], lattice.lower[f]}, {lattice.upper[e] - lattice.lower[e], lattice.upper[f] - lattice.lower[f]}, {}};
+  const int cells = links.cells[0] * links.cells[1];
+  links.length = Array<float>(uninitialised("corpuscle::contact::side_links"), cells);
+  const SideLinks out = links;
+  Kokkos::parallel_for(
+      "corpuscle::contact::side_links", Policy(0, cells), KOKKOS_LAMBDA(int n) {
+        double least = 1e30;
+        for (int corner = 0; corner < 4; ++corner) {
+          int at[3];
+          at[d] = end == 0 ? lattice.lower[d] : lattice.upper[d] - 1;
+          at[e] = out.lower[0] + n % out.cells[0] + corner % 2;
+          at[f] = out.lower[1] + n / out.cells[0] + corner / 2;
+          const int c = lattice.node(at[0], at[1], at[2]);
+          least = smaller(least, norm(lattice.position(c + lattice.index.stride(d)) - lattice.position(c)));
+        }
+        out.length(n) = static_cast<float>(least);
+      });
+  return links;
+}
+
+/// Of the grid's sides that end the lattice.
+inline WallLinks links_across_walls(const Lattice& lattice) {
+  WallLinks links;
+  for (int d = 0; d < 3; ++d)
+    for (int end = 0; end < 2; ++end)
+      if (end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d]) links.side[d][end] = links_across(lattice, d, end);
+  return links;
+}
+
 /// Walls beside vertices whose markers are at home. Vertices may have moved on since the markers were placed, by less than walls
 /// bend.
 struct WallContacts {
@@ -88,11 +147,12 @@ struct WallContacts {
   WallSides walls;
   SurfaceSet surface;    // of the vertices
   double reach = 0;      // um
+  WallLinks links{};
 
   /// Of a marker's vertex; far where no wall is within reach, or the marker is not at home.
   KOKKOS_INLINE_FUNCTION WallGap of(int marker) const {
     if (!markers.home(marker)) return {};
-    return nearest_wall(lattice, walls, MarkerPlace(lattice, markers, marker).eta, load(surface.x, markers.vertex(marker)), reach);
+    return nearest_wall(lattice, walls, links, MarkerPlace(lattice, markers, marker).eta, load(surface.x, markers.vertex(marker)), reach);
   }
 };
 

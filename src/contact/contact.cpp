@@ -7,6 +7,7 @@
 
 #include "contact/contact_pushes.hpp"
 #include "contact/find_contacts.hpp"
+#include "contact/fit_motion.hpp"
 #include "contact/keep_apart.hpp"
 #include "contact/step_ways.hpp"
 #include "core/error.hpp"
@@ -151,14 +152,16 @@ void Contact::make_arrays() {
   Kokkos::deep_copy(side_, -1);
   lists_.items = lists_.groups = 0;
   skin_ = -1;
+  together_ = {};
 }
 
-/// What is of no use beyond a call: pushes, and contacts at positions ahead.
+/// What is of no use beyond a call: spheres, pushes, and contacts at positions ahead.
 void Contact::take_workspace(bool ahead) {
   const std::size_t groups = lists_.groups, triangles = surface_.triangles;
   const std::size_t pushes = Parts::numbers<double>(groups) + Parts::numbers<int>(groups) + Parts::numbers<int>(triangles + 1);
   const std::size_t contacts = ahead ? Parts::numbers<int>(groups) + 7 * groups : 0;
-  Parts parts(workspace_->reserve(pushes + contacts));
+  Parts parts(workspace_->reserve(Parts::numbers<float>(4 * triangles) + pushes + contacts));
+  spheres_.sphere = Table<float>(parts.take<float>(4 * triangles), triangles, 4);
   pushes_.push = Array<double>(parts.take<double>(groups), groups);
   pushes_.hit = Array<int>(parts.take<int>(groups), groups);
   pushes_.hit_start = Array<int>(parts.take<int>(triangles + 1), triangles + 1);
@@ -170,10 +173,8 @@ void Contact::take_workspace(bool ahead) {
 }
 
 /// @param items  for so many there is room then
-ContactItems Contact::make_bins(double width, std::size_t items) {
-  const TriangleBounds bounds = bounds_of_triangles(surface_);
-  bins_.radius = bounds.radius;
-  bins_.width = width + bounds.radius;
+ContactItems Contact::make_bins(double width, const TriangleBounds& bounds, std::size_t items) {
+  bins_.width = (width + bounds.radius) / bins_.around;
   const double most = 2.0 * surface_.triangles + 1000;
   double count;
   do {
@@ -187,36 +188,78 @@ ContactItems Contact::make_bins(double width, std::size_t items) {
     if (count > most) bins_.width *= 1.3;
   } while (count > most);
   const std::size_t starts = bins_.count() + 1, triangles = surface_.triangles, vertices = surface_.vertices + 1;
-  Parts parts(workspace_->reserve(Parts::numbers<int>(starts) + Parts::numbers<int>(triangles) + Parts::numbers<int>(vertices) +
-                                  Parts::numbers<int>(items)));
+  Parts parts(workspace_->reserve(Parts::numbers<float>(4 * triangles) + Parts::numbers<int>(starts) + Parts::numbers<int>(triangles) +
+                                  Parts::numbers<int>(vertices) + Parts::numbers<int>(items)));
+  spheres_.sphere = Table<float>(parts.take<float>(4 * triangles), triangles, 4);
   bins_.start = Array<int>(parts.take<int>(starts), starts);
   bins_.order = Array<int>(parts.take<int>(triangles), triangles);
   sort_triangles(surface_, bins_);
+  enclose_triangles(surface_, spheres_, bins_.order);
   return {Array<int>(parts.take<int>(vertices), vertices), Array<int>(parts.take<int>(items), items)};
 }
 
+/// Whether nothing that is not listed can come near in the next step: two vertices come nearer by what each does beyond the smooth
+/// motion, and by what that does over the distance between them.
+bool Contact::lists_hold(const StepWays& ways, double dt) const {
+  constexpr double kept = 0.48;  // half, less what rounding positions to single precision may hide
+  if (skin_ < 0) return false;
+  const double sheared = 0.5 * steepest_ * (together_.time + dt) * span_;
+  return ways.whole + sheared < kept * skin_ && ways.drift < wander_;
+}
+
+/// What all do together from now on, or nothing where that brings them less near to each other. @returns the ways of a step from here
+StepWays Contact::choose_motion(const TriangleBounds& bounds, double dt) {
+  constexpr double most_sheared = 0.05;  // in a step, of the skin as of all distances
+  SpaceBounds space;
+  for (int d = 0; d < 3; ++d) {
+    space.lower[d] = bounds.lower[d] - bounds.radius;
+    space.upper[d] = bounds.upper[d] + bounds.radius;
+  }
+  together_ = {};
+  steepest_ = 0;
+  const StepWays by_mean = step_ways(surface_, listed_, together_, 0, dt);
+  if (images_.count > 1) return by_mean;  // what moves smoothly here moves otherwise a period further on
+  const MotionSince fitted{fit_motion(surface_, space), 0};
+  const double gradient = steepest_gradient(fitted.motion, space);
+  const StepWays ways = step_ways(surface_, listed_, fitted, 0, dt);
+  const double sheared = 0.5 * gradient * dt * (reach_.other + 2 * bounds.radius);
+  if (!(gradient * dt < most_sheared && ways.whole + sheared < by_mean.whole)) return by_mean;
+  together_ = fitted;
+  steepest_ = gradient;
+  return ways;
+}
+
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
-/// @param way  um, from the present lists to the end of the next step
-void Contact::make_lists(double way, double dt) {
+/// @param ways  from the present lists to the end of the next step
+void Contact::make_lists(const StepWays& ways, double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
-  constexpr double kept = 0.48;             // half, less what rounding positions to single precision may hide
+  constexpr double skins = 4, drifts = 8;   // of which vertices may drift
   if (surface_.vertices == 0) return;  // on this rank, at present
-  if (skin_ >= 0 && way < kept * skin_) return;
+  if (lists_hold(ways, dt)) return;
+  const TriangleBounds bounds = bounds_of_triangles(surface_);
   copy_rounded(surface_.vertices, surface_.x, listed_);
-  if (skin_ >= 0) way = step_ways(surface_, listed_, 0, dt).whole;
+  const StepWays ahead = choose_motion(bounds, dt);
+  const double way = ahead.whole + 0.5 * steepest_ * dt * (reach_.other + 2 * bounds.radius);
   skin_ = std::max(least * settings_.range_um, std::min(steps * way, 2 * reach_.other) + 2 * way);
   const ContactReach with_skin{reach_.other + skin_, reach_.own + skin_, reach_.apart};
   const double width = std::max(with_skin.other, with_skin.own);
-  ContactItems items = make_bins(width, items_room_);
-  const auto count = [&] {
-    return static_cast<std::size_t>(countable_items(count_items({surface_, images_, bins_, rest_, with_skin}, items)));
-  };
+  span_ = width + 2 * bounds.radius;
+  GapsWanted wanted = peers_ ? peers_->gaps : GapsWanted();
+  wander_ = wanted.everywhere() || surface_.own_cells == surface_.cells ? far_away
+                                                                       : std::max({skins * skin_, reach_.other, drifts * ahead.drift});
+  for (int d = 0; d < 3; ++d) {
+    wanted.lower[d] -= wander_;
+    wanted.upper[d] += wander_;
+  }
+  ContactItems items = make_bins(width, bounds, items_room_);
+  const auto search = [&]() -> ContactSearch { return {surface_, images_, bins_, spheres_, rest_, with_skin, wanted}; };
+  const auto count = [&] { return static_cast<std::size_t>(countable_items(count_items(search(), items))); };
   if (std::size_t all = count(); all > items_room_) {  // seldom: what is in the workspace is lost where it grows
     items_room_ = with_spare(all);
-    items = make_bins(width, items_room_);
+    items = make_bins(width, bounds, items_room_);
     count();
   }
-  fill_lists({surface_, images_, bins_, rest_, with_skin}, items);
+  fill_lists(search(), items);
   ++report_.lists;
 }
 
@@ -232,16 +275,24 @@ void Contact::fill_lists(const ContactSearch& search, const ContactItems& items)
   grow_list(now_.gap, "contact_gap", lists_.groups);
   grow_list(now_.weight, "contact_weight", lists_.groups, 3);
   grow_list(now_.normal, "contact_normal", lists_.groups, 3);
+  Kokkos::deep_copy(Exec(), now_.item, -1);
 }
 
 StepWays Contact::ways(double dt) const {
   if (surface_.vertices == 0) return {};
-  return skin_ < 0 ? step_ways(surface_, surface_.x, 0, dt) : step_ways(surface_, listed_, skin_, dt);
+  return skin_ < 0 ? step_ways(surface_, surface_.x, together_, 0, dt) : step_ways(surface_, listed_, together_, skin_, dt);
 }
 
+/// After take_workspace().
 void Contact::find(const ContactViews& contacts) {
-  find_contacts(surface_, images_, reach_, lists_, contacts);
+  enclose_triangles(surface_, spheres_);
+  find_contacts(surface_, images_, reach_, spheres_, now_.item, lists_, contacts);
   gaps_to_others(surface_, lists_, contacts, far_away, gap_);
+}
+
+void Contact::find_now() {
+  take_workspace(false);
+  find(now_);
 }
 
 /// Moves surfaces until no gap is below its goal. @returns what was short before
@@ -282,9 +333,15 @@ bool Contact::limit_approach(double time) {
 Shortfall Contact::shortfall(const GapGoal& goal) {
   Shortfall found = gap_corrections(surface_, images_, lists_, now_, goal, settings_.range_um, own_, pushes_.push);
   if (!peers_) return found;
-  found.most = peers_->comm.max(found.most);
-  found.limited = static_cast<int>(peers_->comm.sum(static_cast<long>(found.limited)));
-  found.through = static_cast<int>(peers_->comm.sum(static_cast<long>(found.through)));
+  double all[2] = {found.most, found.limited + found.through > 0 ? 1.0 : 0.0};
+  peers_->comm.max(all, 2);
+  found.most = all[0];
+  if (all[1] > 0) {  // seldom
+    double numbers[2] = {static_cast<double>(found.limited), static_cast<double>(found.through)};
+    peers_->comm.sum(numbers, 2);
+    found.limited = static_cast<int>(numbers[0]);
+    found.through = static_cast<int>(numbers[1]);
+  }
   return found;
 }
 
@@ -292,8 +349,10 @@ Shortfall Contact::shortfall(const GapGoal& goal) {
 CrossingCount Contact::crossings() {
   CrossingCount found = find_crossings(surface_, lists_, now_, side_, own_);
   if (!peers_) return found;
-  found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
-  found.deepest = peers_->comm.max(found.deepest);
+  double all[2] = {found.deepest, found.vertices > 0 ? 1.0 : 0.0};
+  peers_->comm.max(all, 2);
+  found.deepest = all[0];
+  if (all[1] > 0) found.vertices = static_cast<int>(peers_->comm.sum(static_cast<long>(found.vertices)));
   return found;
 }
 
@@ -319,13 +378,15 @@ void Contact::mend_crossings(double time, double dt) {
     }
     if (repair == 0) count_crossings(found.vertices, found.first, time);
     correct(0, healed_share * settings_.range_um);
-    find(now_);
+    find_now();
   }
 }
 
 void Contact::look(double time, double dt) {
+  together_.time += step_;
+  step_ = dt;
   make_lists(refuse_runaways(time, dt), dt);
-  find(now_);
+  find_now();
   mend_crossings(time, dt);
   refuse_fast_passage(time, dt);
   note_gaps();
@@ -337,16 +398,20 @@ void Contact::note_gaps() {
   const auto within = [&](GapWithin what) { return least_gap(what, surface_, lists_, now_); };
   double least[3] = {rigid ? within(GapWithin::membranes) : least_of(surface_.vertices, gap_), within(GapWithin::body),
                      rigid ? within(GapWithin::bodies) : far_away};
-  if (peers_)
-    for (double& gap : least) gap = peers_->comm.min(gap);
+  if (peers_) {
+    for (double& gap : least) gap = -gap;
+    peers_->comm.max(least, 3);
+    for (double& gap : least) gap = -gap;
+  }
   report_.smallest_gap = std::min(report_.smallest_gap, least[0]);
   report_.smallest_own_gap = std::min(report_.smallest_own_gap, least[1]);
   report_.smallest_body_gap = std::min(report_.smallest_body_gap, least[2]);
 }
 
 void Contact::look_at_start(double dt) {
-  make_lists(ways(dt).whole, dt);
-  find(now_);
+  step_ = dt;
+  make_lists(ways(dt), dt);
+  find_now();
   const auto found = crossings();
   if (found.vertices > 0)
     throw InputError(
@@ -385,10 +450,7 @@ void Contact::add_forces(double dt, bool ahead, const Components<double>& force)
   push(contacts, force);
 }
 
-double Contact::energy(double dt) const {
-  const double here = contact_energy(surface_, law(dt), rest_, lists_, now_, own_);
-  return peers_ ? peers_->comm.sum(here) : here;
-}
+double Contact::energy(double dt) const { return contact_energy(surface_, law(dt), rest_, lists_, now_, own_); }
 
 std::array<double, 4> Contact::load_on_rigid(double dt, int body) const {
   const Sums<4> here = contact_load_on_rigid(surface_, law(dt), rest_, lists_, now_, own_, body);

@@ -14,6 +14,7 @@
 #include "contact/contact_report.hpp"
 #include "contact/contact_views.hpp"
 #include "contact/keep_apart.hpp"
+#include "contact/smooth_motion.hpp"
 #include "contact/triangle_bins.hpp"
 #include "core/workspace.hpp"
 #include "input/case.hpp"
@@ -26,6 +27,7 @@ struct ContactPeers {
   Comm comm;
   std::function<void()> update_copies;  // positions of this rank's cells to all their copies
   std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>();  // shared with others that do not use it while Contact does
+  GapsWanted gaps{};  // of copies
 };
 
 /// Of the lists' entries on a rank. @throws ComputationError  for more than an int counts
@@ -75,7 +77,7 @@ class Contact {
 
   /// [vertex] um to the nearest other body, rigid ones included, of look() or add_forces(), whichever was last; large where nothing is near.
   const Array<double>& gaps() const { return gap_; }
-  /// Energy of the contacts that look() saw, fJ, of all ranks.
+  /// Energy of the contacts that look() saw, fJ, of those that count on this rank.
   double energy(double dt) const;
   /// Their force on a rigid body, nN, of all ranks, and its power, nW. @param body  its number among these
   std::array<double, 4> load_on_rigid(double dt, int body) const;
@@ -97,10 +99,13 @@ class Contact {
   Shortfall shortfall(const GapGoal& goal);
   std::string told_text(int first) const;
   StepWays ways(double dt) const;
-  void make_lists(double way, double dt);
+  bool lists_hold(const StepWays& ways, double dt) const;
+  StepWays choose_motion(const TriangleBounds& bounds, double dt);
+  void make_lists(const StepWays& ways, double dt);
   void fill_lists(const ContactSearch& search, const ContactItems& items);
-  ContactItems make_bins(double width, std::size_t items);
+  ContactItems make_bins(double width, const TriangleBounds& bounds, std::size_t items);
   void find(const ContactViews& contacts);
+  void find_now();
   Shortfall correct(double share, double least);
   void mend_crossings(double time_us, double dt);
   double fastest_crossing(double dt) const;
@@ -108,7 +113,7 @@ class Contact {
   std::string crossing_text(int contact) const;
   std::string place_text(int vertex) const;
   std::string pair_text(int vertex, int item) const;
-  double refuse_runaways(double time_us, double dt);
+  StepWays refuse_runaways(double time_us, double dt);
   void refuse_fast_passage(double time_us, double dt);
   void refuse(const LongestWay& found, double most, const std::function<std::string()>& text) const;
 
@@ -119,6 +124,7 @@ class Contact {
   ContactReach reach_;  // without the skin
   ContactRest rest_;
   TriangleBins bins_;  // in the workspace, as lists are made
+  TriangleSpheres spheres_;  // there: in the order of bins as lists are made, of triangles as contacts are found
   std::size_t items_room_ = 0;  // there, for items
   ContactLists lists_;
   ContactViews now_;      // at the positions of look()
@@ -126,6 +132,11 @@ class Contact {
   ContactPushes pushes_;  // there as well
   Table<float> listed_;   // [vertex, 3] um, where the lists were made
   double skin_ = -1;           // um; negative before there are lists
+  double wander_ = 0;          // um, that vertices may drift while lists hold
+  MotionSince together_;       // since lists were made
+  double steepest_ = 0;        // 1/us, gradient of that motion
+  double span_ = 0;            // um, from a vertex to the farthest corner of what is just beyond the lists
+  double step_ = 0;            // us, until the next look
   double longest_way_ = 0;     // um, in a step, beyond the mean of all
   Array<int> side_;            // [vertex]
   Array<double> gap_;          // [vertex]

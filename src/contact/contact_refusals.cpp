@@ -34,9 +34,9 @@ int countable_items(std::int64_t items) {
 }
 
 /// Before lists are made: they reach as far as anything may come from, and would take in all of a scene that flies apart.
-/// @returns um, from the present lists to the end of the next step
+/// @returns from the present lists to the end of the next step
 /// @throws ComputationError
-double Contact::refuse_runaways(double time, double dt) {
+StepWays Contact::refuse_runaways(double time, double dt) {
   const StepWays all = ways(dt);
   const LongestWay& found = all.step;
   refuse(found, longest_way_, [&] {
@@ -49,7 +49,7 @@ double Contact::refuse_runaways(double time, double dt) {
                        body_name(surface_, cell), found.vertex - first(cell), place_text(found.vertex), time, found.way, dt,
                        longest_way_);
   });
-  return all.whole;
+  return all;
 }
 
 /// What goes through a triangle in one step, and further than the range, does so where contact has no part in it, and may end beyond

@@ -81,9 +81,11 @@ CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& tran
                                cells_.to_copies(cells_.surfaces().x, true);
                                follow_bodies();
                              },
-                             workspace_};
+                             workspace_,
+                             {transfer.search().lower, transfer.search().upper}};
     contact_ = std::make_unique<Contact>(*scene.contact, membranes_.surfaces(), Images{}, viscosity, blend, &peers);
     walls_ = walls_of(scene.boundaries);
+    links_ = links_across_walls(transfer.block().lattice);
     refuse_thin_blocks(scene.contact->range_um);
     if (rigid) {
       const double reach = farthest(membranes_.templates()) + 2 * contact_->reach();
@@ -158,7 +160,7 @@ void CellLoads::look_at_start(double dt) {
 }
 
 WallContacts CellLoads::at_walls(double reach) const {
-  return {transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces(), reach};
+  return {transfer_.block().lattice, transfer_.views(), walls_, membranes_.surfaces(), reach, links_};
 }
 
 void CellLoads::note_wall_gap() {
@@ -208,10 +210,10 @@ double CellLoads::power_of_pushes() const {
 
 double CellLoads::contact_energy(double dt) const {
   if (!contact_) return 0;
-  const double between = contact_->energy(dt);
-  if (!walls_.any()) return between;
   const ContactLaw law = contact_->law(dt);
-  return between + comm_.sum(wall_energy(at_walls(law.range), law, contact_->at_rest()));
+  double here = contact_->energy(dt);
+  if (walls_.any()) here += wall_energy(at_walls(law.range), law, contact_->at_rest());
+  return comm_.sum(here);
 }
 
 std::optional<ContactReport> CellLoads::report() const {

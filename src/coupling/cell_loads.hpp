@@ -80,6 +80,7 @@ class CellLoads {
   std::unique_ptr<JoinedSurfaces> joined_;  // and rigid bodies
   bool bodies_move_ = false;                // through periodic sides
   WallSides walls_;
+  WallLinks links_;  // of this block
   Components<double> force_;  // [vertex, 3] nN
   double smallest_wall_gap_ = 1e30;  // um
   std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed

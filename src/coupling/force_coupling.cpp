@@ -66,6 +66,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
   for (const CellReference& type : membranes_->types()) ratios.push_back(type.viscosity_ratio);
   if (std::any_of(ratios.begin(), ratios.end(), [](double ratio) { return ratio != 1; })) {
     cytosol_ = std::make_unique<Cytosol>(fluid.grid(), ratios);
+    transfer_->find_corners();
     fluid.set_viscosity(cytosol_->relative_viscosity(), cytosol_->least(), cytosol_->fluidity());
     if (scene.coupling->slip) transfer_->slip_between(ratios);
   }

@@ -20,31 +20,56 @@ View make(const char* name, Extents... extents) {
   return View(uninitialised(std::string("corpuscle::transfer::") + name), extents...);
 }
 
-/// Bounds of the lattice in space, widened by one of its links, and its nodes in bins.
+/// Out of the grid at a node on its side across d, unit.
+template <class Positions>
+Vec3 outward_of(const Lattice& lattice, const Positions& x, const int (&at)[3], int d) {
+  const int inward = at[d] == lattice.lower[d] ? 1 : -1, c = lattice.node(at[0], at[1], at[2]);
+  const Vec3 way = load(x, c) - load(x, c + inward * lattice.index.stride(d));
+  return (1 / norm(way)) * way;
+}
+
+/// Bounds of the lattice in space, beyond the grid's sides widened by one of its links, and its nodes in bins. Beyond other blocks and
+/// periodic sides no marker reaches this one.
 /// @returns the longest link
 double find_bounds(const Lattice& lattice, MarkerSearch& search) {
+  constexpr double round_off = 1e-6;  // of a link
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), lattice.x);
   double link = 0, sum = 0;
   long links = 0;
+  const auto for_nodes = [&](const auto& use) {
+    for (int k = lattice.lower[2]; k <= lattice.upper[2]; ++k)
+      for (int j = lattice.lower[1]; j <= lattice.upper[1]; ++j)
+        for (int i = lattice.lower[0]; i <= lattice.upper[0]; ++i) {
+          const int at[3] = {i, j, k};
+          use(at, load(x, lattice.node(i, j, k)));
+        }
+  };
+  const auto take_in = [&](const Vec3& p) {
+    for (int d = 0; d < 3; ++d) {
+      search.lower[d] = std::min(search.lower[d], p[d]);
+      search.upper[d] = std::max(search.upper[d], p[d]);
+    }
+  };
   search.lower = {1e300, 1e300, 1e300};
   search.upper = {-1e300, -1e300, -1e300};
-  for (int k = lattice.lower[2]; k <= lattice.upper[2]; ++k)
-    for (int j = lattice.lower[1]; j <= lattice.upper[1]; ++j)
-      for (int i = lattice.lower[0]; i <= lattice.upper[0]; ++i) {
-        const int at[3] = {i, j, k}, c = lattice.node(i, j, k);
-        const Vec3 p = load(x, c);
-        for (int d = 0; d < 3; ++d) {
-          search.lower[d] = std::min(search.lower[d], p[d]);
-          search.upper[d] = std::max(search.upper[d], p[d]);
-          if (at[d] == lattice.upper[d]) continue;
-          const double length = norm(load(x, c + lattice.index.stride(d)) - p);
-          link = std::max(link, length);
-          sum += length, ++links;
-        }
-      }
+  for_nodes([&](const int (&at)[3], const Vec3& p) {
+    take_in(p);
+    for (int d = 0; d < 3; ++d) {
+      if (at[d] == lattice.upper[d]) continue;
+      const double length = norm(load(x, lattice.node(at[0], at[1], at[2]) + lattice.index.stride(d)) - p);
+      link = std::max(link, length);
+      sum += length, ++links;
+    }
+  });
   search.bins = make_node_bins(lattice, search.lower, search.upper, sum / static_cast<double>(links), link);
-  search.lower -= {link, link, link};
-  search.upper += {link, link, link};
+  for_nodes([&](const int (&at)[3], const Vec3& p) {
+    for (int d = 0; d < 3; ++d)
+      if ((lattice.boundary_below[d] && at[d] == lattice.lower[d]) || (lattice.boundary_above[d] && at[d] == lattice.upper[d]))
+        take_in(p + link * outward_of(lattice, x, at, d));
+  });
+  const double margin = round_off * link;
+  search.lower -= {margin, margin, margin};
+  search.upper += {margin, margin, margin};
   return link;
 }
 
@@ -261,7 +286,16 @@ void Transfer::spread_rest(const Components<double>& force, const SurfaceSet* su
   for (int d = 0; d < 3; ++d) grid_->halo().exchange(faces_.across[d]);
 }
 
+void Transfer::find_corners() {
+  if (corners_) return;
+  corners_ = true;
+  const Vec3 link{largest_spacing_, largest_spacing_, largest_spacing_};
+  search_.lower -= link;
+  search_.upper += link;
+}
+
 void Transfer::sharpen_pressure() {
+  find_corners();
   jump_.emplace();
   jump_->sum = Array<std::int64_t>("corpuscle::transfer::jump_sum", block_.index().size());
 }

@@ -33,6 +33,9 @@ class Transfer {
   void spread(const Components<double>& force, const SlipViews* slip = nullptr);
   /// The same with what is normal to the surface that they act on as a jump of the pressure across it. After sharpen_pressure().
   void spread(const Components<double>& force, const SurfaceSet& surface, const SlipViews* slip = nullptr);
+  /// From now on vertices are found where they are up to a link beyond the nodes that this rank knows: they are corners of triangles that
+  /// reach into it.
+  void find_corners();
   /// From now on there is memory for that.
   void sharpen_pressure();
   /// Membranes of those types [type] have fluids so many times as viscous inside as outside: their slip is another from now on.
@@ -90,6 +93,7 @@ class Transfer {
   CouplingSettings::Kernel kernel_;
   TransferBlock block_;
   MarkerSearch search_;
+  bool corners_ = false;  // are found
   VertexPlaces places_;
   HostCopy<Array<int>> beyond_host_;
   MarkerViews markers_;

@@ -181,4 +181,24 @@ TEST_CASE("a cell's motion does not depend on how the domain is cut over ranks",
 }
 #endif
 
+TEST_CASE("triangles of two and three spacings reach over periodic sides, whatever is asked of them", "[coupling][force]") {
+  // Their corners lie beyond the nodes that a block knows of what is on the other side.
+  const bool sharp = GENERATE(false, true);
+  const int cells = sharp ? 30 : 42;
+  Case scene = boxed({cells, cells, cells}, {6, 6, 6}, 20, 40);
+  make_periodic(scene, {0, 1, 2});
+  scene.fluid->convection = FluidSettings::Convection::none;
+  scene.coupling->scheme = Scheme::force;
+  if (sharp) scene.coupling->pressure = CouplingSettings::Pressure::sharp;
+  scene.cells = {cell_at({5, 5, 5})};
+  scene.cells[0].vertices = 200;
+  scene.cells[0].viscosity_ratio = sharp ? 1 : 5;
+  Timers timers;
+  FlowSimulation simulation(Comm(), scene, timers);
+  CHECK_NOTHROW([&] {
+    while (!simulation.done()) simulation.step();
+  }());
+  CHECK(simulation.steps() == 2);
+}
+
 }  // namespace corpuscle

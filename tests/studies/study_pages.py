@@ -26,6 +26,10 @@ STUDIES = {
                          (["--minutes", "0.03"], ["# The tube beside", "No ratio", ALL])]),
     "pack": ("pack.md", [(["--minutes", "0"], ["# Dense packs in shear", "| 1000 |", ALL, "5.38 (at 124 /s)"]),
                          (["--quick", "--slip", "false", "--minutes", "0.03"], ["# Dense packs in shear", ALL])]),
+    "scaling": ("scaling.md", [
+        (["--quick", "--minutes", "0"], ["# How runs grow", "| blood tube | weak |", "| 27 | 36 x 36 x 36 |", "1000 H200", ALL]),
+        (["--quick", "--part", "counts", "--part", "model", "--ranks", "2", "--minutes", "0.5"],
+         ["| 2 | 12 x 12 x 24 | 12 |", "not run", "limited by"])]),
     "two_cells": ("two_cells.md", [(["--minutes", "0"], ["# Two red cells", "| 0.5 | 0.33 | 1000 | 20 |", ALL]),
                                    (["--quick", "--minutes", "0.01"], ["# Two red cells", ALL])]),
     "threads_ranks": ("threads_ranks.md", [(["--minutes", "0"], ["# The tube on", "2 ranks", ALL]),
