@@ -1,12 +1,12 @@
 // Entry point of every test program: Kokkos and MPI live for its whole run, and ranks other than 0 stay quiet.
-#define CATCH_CONFIG_RUNNER
-#include <catch2/catch.hpp>
-
 #include <Kokkos_Core.hpp>
 
 #ifdef CORPUSCLE_MPI
 #include <mpi.h>
 #endif
+
+/// Catch2's, with the number of what failed. @param quiet  on ranks other than 0
+int run_tests(int argc, char** argv, bool quiet);
 
 int main(int argc, char** argv) {
   int rank = 0;
@@ -15,13 +15,7 @@ int main(int argc, char** argv) {
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
 #endif
   Kokkos::initialize(argc, argv);
-  int failed = 0;
-  {
-    Catch::Session session;
-    if (rank != 0) session.configData().outputFilename = "%debug";
-    failed = session.applyCommandLine(argc, argv);
-    if (failed == 0) failed = session.run();
-  }
+  int failed = run_tests(argc, argv, rank != 0);
   Kokkos::finalize();
 #ifdef CORPUSCLE_MPI
   MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
