@@ -140,7 +140,7 @@ void report_totals(const FlowRecord& record, const RunTotals& now, Report& repor
   report_contact(simulation, now, report);
   if (simulation.membranes()) {
     errors["volume_drift"] = now.volume_drift;
-    errors["area_drift"] = now.area_drift;
+    if (simulation.membranes()->any_holds_area()) errors["area_drift"] = now.area_drift;
     if (!simulation.shared_cells()) {
       errors["coupling_residual"] = now.residual.samples ? now.residual.sum / static_cast<double>(now.residual.samples) : 0.0;
       errors["coupling_residual_max"] = now.residual.largest;

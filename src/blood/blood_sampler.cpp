@@ -220,7 +220,8 @@ const BloodSample& BloodSampler::sample() {
   if (plasma_speed_ != 0) last_.relative_viscosity = plasma_speed_ / last_.mean_speed;
   WallShear walls{unknown, unknown};
   if (by_walls()) walls = wall_shear();
-  if (std::abs(walls.rate) > 0) last_.relative_viscosity = walls.stress / (simulation_.fluid().viscosity() * walls.rate);
+  if (std::abs(walls.rate) > 0 && flow_->no_viscosity.empty())
+    last_.relative_viscosity = walls.stress / (simulation_.fluid().viscosity() * walls.rate);
   last_.cell_free_layer_um = unknown;
   if (windows_ > 0) measure_layer();
   const bool moving = std::abs(walls.rate) > 0;  // at rest there is no viscosity to see
@@ -309,7 +310,7 @@ BloodSampler::Figure BloodSampler::viscosity_figure() const {
     figure.value = plasma_speed_ / speed;
     figure.error = std::abs(figure.value / speed) * series.least_error();
     figure.known = series.error_known();
-  } else if (by_walls()) {
+  } else if (by_walls() && flow_->no_viscosity.empty()) {
     const RunningMean &stress = means_.of(drag), &rate = means_.of(wall_rate);
     const double viscosity = simulation_.fluid().viscosity();
     figure.value = stress.mean() / (viscosity * rate.mean());

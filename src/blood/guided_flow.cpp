@@ -203,8 +203,9 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
 
 }  // namespace
 
-std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid) {
-  if (!scene.grid || scene.boundaries.size() != 6) return std::nullopt;
+namespace {
+
+std::optional<GuidedFlow> flow_in_grid(const Case& scene, FluidSolver& fluid) {
   switch (scene.grid->generator) {
     case Generator::box:
       return box_flow(scene, fluid);
@@ -215,6 +216,28 @@ std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid
       break;
   }
   return std::nullopt;
+}
+
+/// What else than blood has a say in how much it takes to drive the flow; empty if nothing has.
+std::string disturbed(const Case& scene, FluidSolver& fluid, const GuidedFlow& flow) {
+  if (std::any_of(scene.cells.begin(), scene.cells.end(), [](const CellSettings& cell) { return cell.push_nN != Triple{}; }))
+    return "cells are pushed (push_nN), which drives or holds the flow as well";
+  if (!flow.sheared) return "";
+  for (int e = 0; e < 3; ++e)
+    if (std::abs(flow.frame.tangent[e]) > 1e-9 && !fluid.grid().index().periodic[e])
+      return "the fluid that moving walls drag along turns back at the ends: make those sides periodic";
+  return "";
+}
+
+}  // namespace
+
+std::optional<GuidedFlow> find_guided_flow(const Case& scene, FluidSolver& fluid) {
+  if (!scene.grid || scene.boundaries.size() != 6) return std::nullopt;
+  std::optional<GuidedFlow> flow = flow_in_grid(scene, fluid);
+  if (!flow || !flow->no_viscosity.empty()) return flow;
+  flow->no_viscosity = disturbed(scene, fluid, *flow);
+  if (!flow->no_viscosity.empty()) flow->gradient = 0;
+  return flow;
 }
 
 std::string why_unguided(const Case& scene) {

@@ -92,6 +92,16 @@ void Membranes::call(const CellNames& names) {
   views_.surface.names = &names_;
 }
 
+namespace {
+
+bool type_holds_area(const CellReference& type) {
+  return type.law.area > 0 || std::visit([](const auto& law) { return law.holds_area; }, type.in_plane);
+}
+
+}  // namespace
+
+bool Membranes::any_holds_area() const { return std::any_of(types_.begin(), types_.end(), type_holds_area); }
+
 /// What messages, the history and the sub-steps ask of each cell.
 void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
   law_.clear(), vertex_mass_.clear(), vertex_area_.clear(), rest_area_.clear(), rest_volume_.clear(), number_.clear();
@@ -104,7 +114,7 @@ void Membranes::describe_cells(const std::vector<HeldCell>& cells, int own) {
     rest_area_.push_back(type.law.rest_area);
     rest_volume_.push_back(type.law.rest_volume);
     number_.push_back(cells[c].number);
-    holds_area_.push_back(type.law.area > 0 || std::visit([](const auto& law) { return law.holds_area; }, type.in_plane));
+    holds_area_.push_back(type_holds_area(type));
   }
 }
 

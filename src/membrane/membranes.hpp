@@ -86,6 +86,8 @@ class Membranes {
   void call(const CellNames& names);
   /// Whether anything but its in-plane law answers a change of a cell's area.
   bool holds_area(int cell) const { return holds_area_[cell]; }
+  /// Of all types of cells.
+  bool any_holds_area() const;
   int cells() const { return views_.cells; }
   int vertices() const { return views_.vertices; }
 

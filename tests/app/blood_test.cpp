@@ -171,6 +171,24 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
 #endif
 }
 
+TEST_CASE("where more than blood drives or holds a flow, nothing is told of how viscous it is") {
+  const auto folder = fresh_folder("disturbed");
+  const std::string name = write_case(folder, "sheared", true, 2).string();
+  const bool pushed = GENERATE(true, false);
+  std::vector<std::string> options{"run", name, "--out", "run", "--overwrite", "--set", "blood.from_us=0", "--set", "time.end_us=40",
+                                   "--set", "output.every_us=40", "--set"};
+  if (pushed) {
+    options.emplace_back("cells.0.push_nN=[0.05, 0, 0]");
+  } else {
+    for (const char* more : {"boundary.0.type=symmetry", "--set", "boundary.1.type=symmetry"}) options.emplace_back(more);
+  }
+  succeed(folder, options, {1, 1});
+  const auto blood = report(folder / "run")["blood"];
+  CHECK_FALSE(blood.contains("relative_apparent_viscosity"));
+  CHECK_THAT(blood["left_out"]["relative_apparent_viscosity"].get<std::string>(),
+             Catch::Contains(pushed ? "cells are pushed" : "turns back"));
+}
+
 TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is left out") {
   const auto folder = fresh_folder("viscometer");
   const std::string name = write_case(folder, "sheared", true, 2).string();

@@ -167,7 +167,7 @@ TEST_CASE("the sheet of a capsule may grow where a red cell would burst") {
   const auto found = history(folder / "out");
   CHECK(found.number(found.lines.size() - 1, "area_um2") > 1.12 * found.number(0, "area_um2"));
   CHECK(found.number(found.lines.size() - 1, "volume_um3") == Approx(found.number(0, "volume_um3")).epsilon(1e-4));
-  CHECK(report(folder / "out")["errors"]["area_drift"] == 0);
+  CHECK(report(folder / "out")["errors"]["area_drift"].is_null());
 }
 
 TEST_CASE("a cell that is alone but near its own image is warned of as two cells are") {
