@@ -220,8 +220,8 @@ const BloodSample& BloodSampler::sample() {
   if (plasma_speed_ != 0) last_.relative_viscosity = plasma_speed_ / last_.mean_speed;
   WallShear walls{unknown, unknown};
   if (by_walls()) walls = wall_shear();
-  if (std::abs(walls.rate) > 0 && flow_->no_viscosity.empty())
-    last_.relative_viscosity = walls.stress / (simulation_.fluid().viscosity() * walls.rate);
+  drag_of_walls_ = std::abs(walls.rate) > 0 ? walls.stress / (simulation_.fluid().viscosity() * walls.rate) : unknown;
+  if (flow_ && flow_->no_viscosity.empty() && by_walls()) last_.relative_viscosity = drag_of_walls_;
   last_.cell_free_layer_um = unknown;
   if (windows_ > 0) measure_layer();
   const bool moving = std::abs(walls.rate) > 0;  // at rest there is no viscosity to see

@@ -27,6 +27,9 @@ class BloodSampler {
   bool due() const;
   /// Every rank calls. Kernels, and no allocation but for more cells than before.
   const BloodSample& sample();
+  /// The walls' drag at the last sample over that of plasma alone at their rate of shear, whatever else drives or holds the fluid; not a
+  /// number without walls that move past each other.
+  double drag_of_walls() const { return drag_of_walls_; }
 
   /// The report's "blood", and why figures are missing there once all are in it.
   nlohmann::json report() const;
@@ -87,6 +90,7 @@ class BloodSampler {
   HostCopy<Array<double>> cell_totals_host_;
   HostCopy<Table<double>> profile_parts_host_, edge_host_;
   std::vector<double> cell_sums_, profile_sums_;  // of all ranks
+  double drag_of_walls_ = 0;
   Components<double> along_walls_;  // [cell, 3] how the drag on each wall counts; only where walls move past each other
   BloodSample last_;
   RunningMeans means_;

@@ -49,7 +49,8 @@ Case beside_wall(double lower, double upper, double push_nN = 0) {
 struct Sheared {
   explicit Sheared(const Comm& comm, const Case& scene) : simulation(comm, scene, timers), sampler(scene, simulation) {
     for (int n = 0; n < 4; ++n) simulation.step();
-    viscosity = sampler.sample().relative_viscosity;
+    CHECK(std::isnan(sampler.sample().relative_viscosity));  // cells are pushed
+    viscosity = sampler.drag_of_walls();
   }
   Timers timers;
   FlowSimulation simulation;
@@ -81,7 +82,7 @@ TEST_CASE("walls that shear blood feel what its cells have on them through the k
   for (int side : {2, 3}) back.boundaries[side].time_table = {{0, -1}, {1000, -1}};
   const Sheared other(Comm(), back);
   CHECK(other.viscosity == Approx(run.viscosity).epsilon(0.01));
-  CHECK(other.sampler.report()["relative_apparent_viscosity"].get<double>() == Approx(other.viscosity));
+  CHECK_FALSE(other.sampler.report().contains("relative_apparent_viscosity"));
 }
 
 TEST_CASE("reported means and errors have the samples' values, in the report's units", "[blood]") {
