@@ -173,6 +173,14 @@ void level_diagonals(const LevelOperator<Real>& level, const bool (&closed)[3][2
   });
 }
 
+/// inverse from the diagonal in all cells, those of the halo too.
+template <class Real>
+void invert_diagonal(const LevelOperator<Real>& level) {
+  Kokkos::parallel_for("corpuscle::multigrid::inverse", Policy(0, level.index.size()), KOKKOS_LAMBDA(int c) {
+    level.inverse(c) = level.diagonal(c) > 0 ? 1 / level.diagonal(c) : Real(0);
+  });
+}
+
 /// own = 0 but at `pinned` (padded cell number on the rank that owns it, -1 elsewhere), where it is as large as the
 /// conductances together: that fixes the level of an all-Neumann problem.
 inline void pin_level(const LevelOperator<CycleReal>& level, int pinned, const Array<CycleReal>& own) {
@@ -194,8 +202,8 @@ inline double sum_conductances(const MultigridLevel& level, int d) {
                    KOKKOS_LAMBDA(int i, int j, int k) { return g(index.cell(i, j, k)); });
 }
 
-// What follows also runs for halo cells behind each line (for_owned_rounded): beyond a physical side inverse is zero, which leaves
-// their x at zero; beyond another rank's side x is exchanged before it is read.
+// What follows also runs for cells of the halo, behind each line (for_box_rounded) and where other ranks do the same: beyond a physical
+// side inverse is zero, which leaves their x at zero; beyond another rank's side what is not known of x is exchanged before it is read.
 
 /// previous, x = the first and the second Chebyshev iterate from zero.
 template <class Field>
@@ -283,6 +291,7 @@ struct WithImages {
   Body body;
   IndexSpace index;
   bool wraps[3];
+  int lower, upper;  // of the cells i of each line
   Field field;
 
   KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
@@ -306,7 +315,7 @@ struct WithImages {
     const int at[3] = {0, j, k};
     for (int d = 1; d < 3; ++d)
       if (wraps[d] && (at[d] == 0 || at[d] == index.n[d] - 1))
-        for (int i = 0; i < index.n[0]; ++i) copy_to_image(d, at[d], first + i);
+        for (int i = lower; i < upper; ++i) copy_to_image(d, at[d], first + i);
   }
 };
 

@@ -256,16 +256,21 @@ void for_owned(const std::string& label, const IndexSpace& index, const Body& bo
   for_box(label, {0, 0, 0}, {index.n[0], index.n[1], index.n[2]}, body);
 }
 
-/// The same where it does no harm to run it for up to three cells of the halo behind each line too: on the host lines are
-/// made up to a multiple of four, since the cells left over when the vectors are full cost as much as the others.
+/// Run `body(i, j, k)` for every cell of a box where it does no harm to run it for up to three cells of the halo behind each of this
+/// rank's own lines too: on the host those are made up to a multiple of four, since the cells left over when the vectors are full cost
+/// as much as the others.
+template <class Body>
+void for_box_rounded(const std::string& label, const IndexSpace& index, const CellBox& box, const Body& body) {
+  auto upper = box.upper;
+#if !defined(KOKKOS_ENABLE_CUDA) && !defined(KOKKOS_ENABLE_HIP)
+  static_assert(IndexSpace::halo >= 3);
+  if (box.lower[0] == 0 && upper[0] == index.n[0]) upper[0] = (index.n[0] + 3) / 4 * 4;
+#endif
+  for_box(label, box.lower, upper, body);
+}
 template <class Body>
 void for_owned_rounded(const std::string& label, const IndexSpace& index, const Body& body) {
-#if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
-  for_owned(label, index, body);
-#else
-  static_assert(IndexSpace::halo >= 3);
-  for_box(label, {0, 0, 0}, {(index.n[0] + 3) / 4 * 4, index.n[1], index.n[2]}, body);
-#endif
+  for_box_rounded(label, index, {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}, body);
 }
 
 /// Sum of `body(i, j, k)` over this rank's owned cells. The order of summation depends on the number of threads only,

@@ -74,7 +74,12 @@ void MultigridCycle<Field>::update() {
     Level& level = levels_[l];
     Halo& halo = hierarchy_->levels()[l].halo;
     level_diagonals(level.views, level.views.closed, level.own);
-    halo.exchange(level.views.inverse);
+    if (halo.cut()) {
+      halo.exchange(level.views.diagonal);
+      invert_diagonal(level.views);
+    } else {
+      halo.exchange(level.views.inverse);
+    }
     if (l + 1 == levels_.size()) break;
     if (level.views.split) halo.exchange(level.own);
     restrict_sums(level.views, levels_[l + 1].views.index, level.own, levels_[l + 1].own);
@@ -82,40 +87,58 @@ void MultigridCycle<Field>::update() {
   }
 }
 
+/// @param layers  of other ranks' cells around this one's block in which `body` does what those do
 template <class Field>
 template <class Body>
-void MultigridCycle<Field>::pass(const char* step, std::size_t number, const Body& body, const Field& result) {
+void MultigridCycle<Field>::pass(const char* step, std::size_t number, const Body& body, const Field& result, int layers) {
   const IndexSpace& index = levels_[number].views.index;
   Halo& halo = hierarchy_->levels()[number].halo;
-  const WithImages<Body, Field> whole{body, index, {halo.wraps(0), halo.wraps(1), halo.wraps(2)}, result};
+  const CellBox box = halo.with_others(layers);
+  const WithImages<Body, Field> whole{body, index, {halo.wraps(0), halo.wraps(1), halo.wraps(2)}, box.lower[0], box.upper[0], result};
   if (whole.wraps[0] || whole.wraps[1] || whole.wraps[2])
-    for_owned_rounded(cycle_label<Field>(step), index, whole);
+    for_box_rounded(cycle_label<Field>(step), index, box, whole);
   else
-    for_owned_rounded(cycle_label<Field>(step), index, body);
+    for_box_rounded(cycle_label<Field>(step), index, box, body);
 }
 
+/// Where the grid is cut, as many layers go over at once as there are steps of smoothing: each step's layers are one less, and what other
+/// ranks do in them is done here too, which takes less time than a message for each step.
 template <class Field>
-void MultigridCycle<Field>::smooth_down(std::size_t number) {
+int MultigridCycle<Field>::layers_exchanged(std::size_t number) const {
+  return hierarchy_->levels()[number].halo.cut() ? std::min(smoothing_.steps, IndexSpace::halo) : 1;
+}
+
+/// @returns the layers of other ranks' cells in which x is known
+template <class Field>
+int MultigridCycle<Field>::smooth_down(std::size_t number) {
   Level& level = levels_[number];
   Halo& halo = hierarchy_->levels()[number].halo;
-  halo.exchange(level.b, 1);
+  int known = layers_exchanged(number);
+  halo.exchange(level.b, known);
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
   const auto first = steps.next(), second = steps.next();
-  pass("smooth_from_zero", number, SmoothFromZero<Field>(level.views, first, second, level.b, level.y, level.x), level.x);
+  pass("smooth_from_zero", number, SmoothFromZero<Field>(level.views, first, second, level.b, level.y, level.x), level.x, --known);
   for (int n = 2; n < smoothing_.steps; ++n) {
-    halo.exchange_with_others(level.x, 1);
-    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y);
+    if (known == 0) halo.exchange_with_others(level.x, known = 1);
+    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y, --known);
     std::swap(level.x, level.y);
   }
+  return known;
 }
 
 template <class Field>
 void MultigridCycle<Field>::smooth_up(std::size_t number) {
   Level& level = levels_[number];
+  Halo& halo = hierarchy_->levels()[number].halo;
   ChebyshevSteps steps(smoothing_.from, smoothing_.to);
+  int known = 0;
   for (int n = 0; n < smoothing_.steps; ++n) {
-    hierarchy_->levels()[number].halo.exchange_with_others(level.x, 1);
-    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y);
+    if (known == 0) {
+      known = std::min(layers_exchanged(number), smoothing_.steps - n);
+      // What is done in other ranks' layers reads images of those, too.
+      known > 1 ? halo.exchange(level.x, known) : halo.exchange_with_others(level.x, known);
+    }
+    pass("smooth", number, Smooth<Field>(level.views, steps.next(), level.b, level.x, level.y), level.y, --known);
     std::swap(level.x, level.y);
   }
 }
@@ -132,12 +155,12 @@ void MultigridCycle<Field>::descend(std::size_t number, int depth) {
   if (number >= first_small_ && !solve_coarsest) return run_small(depth);
   const bool coarsest = number + 1 == levels_.size();
   if (coarsest && solve_coarsest) return solve_coarsest(level);
-  smooth_down(number);
+  const int known = smooth_down(number);
   if (!coarsest && depth > 0) {
     Halo& halo = hierarchy_->levels()[number].halo;
     Level& coarse = levels_[number + 1];
     auto& shared = hierarchy_->levels()[number + 1];
-    halo.exchange_with_others(level.x, 1);
+    if (known == 0) halo.exchange_with_others(level.x, 1);
     for_owned_rounded(cycle_label<Field>("residual"), level.views.index, LevelResidual<Field>{level.views, level.b, level.x, level.y});
     if (level.views.split) halo.exchange_with_others(level.y, 1);
     restrict_sums(level.views, coarse.views.index, level.y, coarse.b);

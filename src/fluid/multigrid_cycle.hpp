@@ -43,12 +43,13 @@ class MultigridCycle {
 
  private:
   template <class Body>
-  void pass(const char* step, std::size_t number, const Body& body, const Field& result);
+  void pass(const char* step, std::size_t number, const Body& body, const Field& result, int layers = 0);
   void find_small_levels();
   void run_small(int depth);
   void descend(std::size_t number, int depth);
-  void smooth_down(std::size_t number);
+  int smooth_down(std::size_t number);
   void smooth_up(std::size_t number);
+  int layers_exchanged(std::size_t number) const;
 
   MultigridHierarchy* hierarchy_;
   Smoothing smoothing_;

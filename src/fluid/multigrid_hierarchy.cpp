@@ -12,13 +12,6 @@ constexpr int smallest_block = 2 * IndexSpace::halo;  // along a direction that 
 constexpr double coarsest_cells = 300;
 constexpr int gathered_cells = 4096;  // a message takes as long as smoothing about as many once
 
-MultigridLevel make_level(const IndexSpace& index) {
-  MultigridLevel level;
-  level.index = index;
-  for (auto& g : level.conductance) g = Array<CycleReal>("corpuscle::multigrid::conductance", index.size());
-  return level;
-}
-
 }  // namespace
 
 MultigridHierarchy::MultigridHierarchy(Grid& grid, const Array<double> (&coefficient)[3]) : grid_(&grid) {
@@ -39,7 +32,9 @@ void MultigridHierarchy::build(const Array<double> (&coefficient)[3], int most_g
 }
 
 void MultigridHierarchy::add_level(const IndexSpace& index, const Comm& comm, const std::array<int, 3>& ranks) {
-  Level level{make_level(index), comm, Halo(comm, index, ranks)};
+  Level level{{}, Components<CycleReal>("corpuscle::multigrid::conductance", index.size(), 3), comm, Halo(comm, index, ranks)};
+  level.views.index = index;
+  for (int d = 0; d < 3; ++d) level.views.conductance[d] = Kokkos::subview(level.conductances, Kokkos::ALL, d);
   for (int d = 0; d < 3; ++d)
     for (int side = 0; side < 2; ++side) level.views.shared[d][side] = level.halo.neighbour(d, side) >= 0;
   levels_.push_back(std::move(level));
@@ -100,20 +95,25 @@ bool MultigridHierarchy::add_coarser(int most_gathered) {
 void MultigridHierarchy::coarsen(std::size_t number) {
   Level& level = levels_[number];
   coarsen_conductances(levels_[number - 1].views, level.views);
-  for (int d = 0; d < 3; ++d) {
+  for (int d = 0; d < 3; ++d)
     if (level.faces[d]) level.faces[d]->run(level.views.conductance[d]);
-    level.halo.exchange(level.views.conductance[d]);
-  }
+  level.halo.exchange(level.conductances);
+}
+
+/// All coarser levels from the finest, of which one layer of the halo is known.
+void MultigridHierarchy::coarsen_all() {
+  if (levels_[0].halo.cut()) levels_[0].halo.exchange(levels_[0].conductances);
+  for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
 }
 
 void MultigridHierarchy::update(const PressureMask& mask) {
   mask_conductances(coefficient_, mask, levels_[0].views);
-  for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
+  coarsen_all();
 }
 
 void MultigridHierarchy::update(const PressureMask& mask, const VaryingViscosity& viscosity) {
   mask_conductances(coefficient_, mask, levels_[0].views, viscosity);
-  for (std::size_t l = 1; l < levels_.size(); ++l) coarsen(l);
+  coarsen_all();
 }
 
 }  // namespace corpuscle

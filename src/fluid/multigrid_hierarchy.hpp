@@ -17,7 +17,8 @@ class MultigridHierarchy {
  public:
   struct Level {
     MultigridLevel views;  // without diagonals, which the cycles' equations differ in
-    Comm comm;             // this rank alone, where it has the whole level
+    Components<CycleReal> conductances;  // those of the views, side by side
+    Comm comm;                           // this rank alone, where it has the whole level
     Halo halo;
     double strength = 0;   // sum of all ranks' conductances, without bodies
     std::unique_ptr<Gathering> cells{}, faces[3]{};  // where the level is the first of which each rank has the whole; else null
@@ -41,6 +42,7 @@ class MultigridHierarchy {
   bool add_coarser(int most_gathered);
   void add_level(const IndexSpace& index, const Comm& comm, const std::array<int, 3>& ranks);
   void coarsen(std::size_t number);
+  void coarsen_all();
 
   Grid* grid_;
   Array<double> coefficient_[3];

@@ -2,6 +2,8 @@
 
 #include "parallel/traffic.hpp"
 
+#include <algorithm>
+
 namespace corpuscle {
 
 namespace {
@@ -28,37 +30,47 @@ std::vector<Block> all_blocks(const Comm& comm, const IndexSpace& part) {
 
 }  // namespace
 
-Gathering::Gathering(const Comm& comm, const IndexSpace& part, const IndexSpace& whole, int direction) : comm_(comm) {
+Gathering::Gathering(const Comm& comm, const IndexSpace& part, const IndexSpace& whole, int direction) : comm_(comm), end_{0} {
+  const std::vector<Block> blocks = all_blocks(comm, part);
   std::vector<int> cells;
-  for (Block block : all_blocks(comm, part)) {
+  for (int r = 0; r < comm.size(); ++r) {
+    Block block = blocks[(comm.rank() + r) % comm.size()];
     if (direction >= 0 && block.first[direction] + block.n[direction] == whole.n[direction]) ++block.n[direction];
-    first_.push_back(static_cast<int>(cells.size()));
     for (int k = 0; k < block.n[2]; ++k)
       for (int j = 0; j < block.n[1]; ++j)
         for (int i = 0; i < block.n[0]; ++i)
           cells.push_back(whole.cell(block.first[0] + i, block.first[1] + j, block.first[2] + k));
-    count_.push_back(static_cast<int>(cells.size()) - first_.back());
+    end_.push_back(static_cast<int>(cells.size()));
   }
-  sent_ = count_, at_ = first_;
   cell_ = Array<int>(uninitialised("corpuscle::gathering::cell"), cells.size());
   Kokkos::deep_copy(cell_, Kokkos::View<int*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(cells.data(), cells.size()));
   buffer_ = Array<float>(uninitialised("corpuscle::gathering::buffer"), 3 * cells.size());
   buffer_host_ = Kokkos::create_mirror_view(buffer_);
 }
 
+/// One message brings the values of as many ranks as are known already (Bruck et al., IEEE Trans. Parallel Distrib. Syst. 8, 1997): a rank
+/// sends as many messages as the logarithm of their number to base two, where one for each other rank would be most of a step's.
+void Gathering::pass_on([[maybe_unused]] int components) {
+#ifdef CORPUSCLE_MPI
+  const int all = comm_.size(), rank = comm_.rank();
+  for (int known = 1; known < all; known *= 2) {
+    const int more = std::min(known, all - known), begin = components * end_[known];
+    const int count = components * end_[known + more] - begin, sent = components * end_[more];
+    traffic().sent(static_cast<long>(sent) * sizeof(float));
+    MPI_Sendrecv(buffer_host_.data(), sent, MPI_FLOAT, (rank - known + all) % all, 0, buffer_host_.data() + begin, count, MPI_FLOAT,
+                 (rank + known) % all, 0, comm_.handle(), MPI_STATUS_IGNORE);
+  }
+#endif
+}
+
 template <class Field>
 void Gathering::gather(const Field& field, int components) {
-  const int rank = comm_.rank(), begin = first_[rank], all = static_cast<int>(cell_.extent(0));
-  for (std::size_t r = 0; r < count_.size(); ++r) sent_[r] = components * count_[r], at_[r] = components * first_[r];
-  pack_cells(cell_, begin, begin + count_[rank], field, buffer_);
+  pack_cells(cell_, 0, end_[1], field, buffer_);
   if (buffer_host_.data() != buffer_.data()) Kokkos::deep_copy(buffer_host_, buffer_);
   Exec().fence();
-#ifdef CORPUSCLE_MPI
-  for (int rank = 1; rank < comm_.size(); ++rank) traffic().sent(static_cast<long>(sent_[comm_.rank()]) * sizeof(float));
-  MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, buffer_host_.data(), sent_.data(), at_.data(), MPI_FLOAT, comm_.handle());
-#endif
+  pass_on(components);
   if (buffer_host_.data() != buffer_.data()) Kokkos::deep_copy(buffer_, buffer_host_);
-  unpack_cells(cell_, 0, all, buffer_, field);
+  unpack_cells(cell_, end_[1], end_.back(), buffer_, field);
 }
 
 template void Gathering::gather(const Array<float>&, int);

@@ -25,10 +25,11 @@ class Gathering {
  private:
   template <class Field>
   void gather(const Field& field, int components);
+  void pass_on(int components);
 
   Comm comm_;
-  std::vector<int> count_, first_, sent_, at_;  // [rank] cells, where they begin; the same times components
-  Array<int> cell_;                             // of the whole, rank by rank
+  std::vector<int> end_;  // [n] cells of n ranks, this one first and those that follow it
+  Array<int> cell_;       // of the whole, rank by rank in that order
   Array<float> buffer_;
   HostMirror<Array<float>> buffer_host_;
 };

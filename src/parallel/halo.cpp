@@ -46,7 +46,7 @@ CellBox slab(const IndexSpace& index, int d, int side, bool outside, int layers)
 constexpr bool whole_planes_pass = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
 
 #ifdef CORPUSCLE_MPI
-/// Along the last direction layers are whole planes, each component's in one piece, which pass from field to field.
+/// Along the last direction layers are whole planes, each component's in one piece, which pass from field to field in one message.
 template <class Field>
 void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neighbour)[2], const Field& field, int components,
                      int layers) {
@@ -54,20 +54,25 @@ void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neig
   const int h = IndexSpace::halo, n = index.n[2], plane = index.stride(2), size = layers * plane;
   const int bytes = size * static_cast<int>(sizeof(Value)), first = index.cell(-h, -h, 0);
   const int sent[2] = {first, first + (n - layers) * plane}, filled[2] = {first - size, first + n * plane};
-  MPI_Request request[12];
+  MPI_Datatype planes = MPI_BYTE;  // all components'
+  if (components > 1) {
+    MPI_Type_create_hvector(components, bytes, static_cast<MPI_Aint>(index.size() * sizeof(Value)), MPI_BYTE, &planes);
+    MPI_Type_commit(&planes);
+  }
+  const int count = components > 1 ? 1 : bytes;
+  MPI_Request request[4];
   int pending = 0;
   Exec().fence();
   for (int side = 0; side < 2; ++side)
-    for (int m = 0; m < components && neighbour[side] >= 0; ++m)
-      MPI_Irecv(field.data() + static_cast<std::size_t>(m) * index.size() + filled[side], bytes, MPI_BYTE, neighbour[side],
-                2 * m + 1 - side, comm.handle(), &request[pending++]);
-  for (int side = 0; side < 2; ++side)
-    for (int m = 0; m < components && neighbour[side] >= 0; ++m) {
-      traffic().sent(bytes);
-      MPI_Isend(field.data() + static_cast<std::size_t>(m) * index.size() + sent[side], bytes, MPI_BYTE, neighbour[side],
-                2 * m + side, comm.handle(), &request[pending++]);
-    }
+    if (neighbour[side] >= 0)
+      MPI_Irecv(field.data() + filled[side], count, planes, neighbour[side], 1 - side, comm.handle(), &request[pending++]);
+  for (int side = 0; side < 2; ++side) {
+    if (neighbour[side] < 0) continue;
+    traffic().sent(static_cast<long>(components) * bytes);
+    MPI_Isend(field.data() + sent[side], count, planes, neighbour[side], side, comm.handle(), &request[pending++]);
+  }
   MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
+  if (components > 1) MPI_Type_free(&planes);
 }
 #endif
 
@@ -132,6 +137,23 @@ Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& 
     send_host_[side] = Kokkos::create_mirror_view(send_[side]);
     receive_host_[side] = Kokkos::create_mirror_view(receive_[side]);
   }
+}
+
+bool Halo::cut() const {
+  for (const auto& sides : neighbour_)
+    for (int rank : sides)
+      if (rank >= 0 && rank != comm_.rank()) return true;
+  return false;
+}
+
+CellBox Halo::with_others(int layers) const {
+  CellBox box;
+  const auto around = [&](int rank) { return rank >= 0 && rank != comm_.rank() ? layers : 0; };
+  for (int d = 0; d < 3; ++d) {
+    box.lower[d] = -around(neighbour_[d][0]);
+    box.upper[d] = index_.n[d] + around(neighbour_[d][1]);
+  }
+  return box;
 }
 
 bool Halo::shared() const {

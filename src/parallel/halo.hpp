@@ -34,6 +34,10 @@ class Halo {
   }
   /// Whether this rank is its own neighbour along direction d.
   bool wraps(int d) const { return neighbour_[d][0] == comm_.rank() && neighbour_[d][1] == comm_.rank(); }
+  /// Whether any layer comes from another rank.
+  bool cut() const;
+  /// This rank's block, and around it so many layers of what other ranks own.
+  CellBox with_others(int layers) const;
   /// Whether any layer is filled: it is not on a rank alone without periodic directions.
   bool shared() const;
 
