@@ -63,6 +63,7 @@ const std::vector<std::vector<double>>& BodyHistory::measure_shapes() {
 }
 
 void BodyHistory::watch_cells(const std::vector<CellDiagnostics>& cells) {
+  const double before = drifts_.area;  // of all ranks
   const Membranes& membranes = *simulation_.membranes();
   for (std::size_t c = 0; c < cells.size(); ++c) {
     drifts_.volume = larger(drifts_.volume, std::abs(cells[c].volume_um3 / cells[c].rest_volume_um3 - 1));
@@ -77,7 +78,7 @@ void BodyHistory::watch_cells(const std::vector<CellDiagnostics>& cells) {
   const Comm& comm = simulation_.grid().comm();
   double drifts[2] = {drifts_.volume, drifts_.area};
   comm.max(drifts, 2);
-  drifts_.widest = static_cast<int>(comm.max(drifts_.area == drifts[1] ? drifts_.widest : -1.0));
+  if (drifts[1] > before) drifts_.widest = static_cast<int>(comm.max(drifts_.area == drifts[1] ? drifts_.widest : -1.0));
   drifts_.volume = drifts[0], drifts_.area = drifts[1];
 }
 
@@ -146,10 +147,10 @@ void BodyHistory::measure_cells() {
 /// Every rank's samples to all, if cells are few, and else their mean.
 void BodyHistory::gather_samples() {
   const Comm& comm = simulation_.grid().comm();
-  elastic_energy_ = comm.sum(elastic_energy_);
   constexpr std::size_t width = 12;
   const std::size_t more = few_cells_ ? shape_columns_.size() : 0, rows = few_cells_ ? simulation_.cells() : 1;
   std::vector<double> table(rows * (width + more), 0.0);
+  table.push_back(elastic_energy_);
   for (const auto& sample : last_) {
     double* row = table.data() + (few_cells_ ? sample.cell * (width + more) : 0);
     for (int d = 0; d < 3; ++d) {
@@ -161,6 +162,7 @@ void BodyHistory::gather_samples() {
     for (std::size_t n = 0; n < more; ++n) row[width + n] += sample.more[n];
   }
   comm.sum(table.data(), static_cast<int>(table.size()));
+  elastic_energy_ = table.back();
   last_.clear();
   for (std::size_t n = 0; n < rows; ++n) {
     double* row = table.data() + n * (width + more);

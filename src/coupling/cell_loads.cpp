@@ -213,7 +213,7 @@ double CellLoads::contact_energy(double dt) const {
   const ContactLaw law = contact_->law(dt);
   double here = contact_->energy(dt);
   if (walls_.any()) here += wall_energy(at_walls(law.range), law, contact_->at_rest());
-  return comm_.sum(here);
+  return here;
 }
 
 std::optional<ContactReport> CellLoads::report() const {

@@ -34,6 +34,14 @@ struct PackedCells;
 struct PackingReport;
 struct PackedShare;
 
+/// What membranes that are forces have to do with the energy of a flow.
+struct CellEnergy {
+  double on_cells = 0;    // power of the fluid on the cells, nW
+  double on_sides = 0;    // of the cells on sides that move, past the fluid, nW
+  double unresolved = 0;  // friction beside the membranes that the grid does not show, nW
+  double contact = 0;     // stored in contacts, fJ
+};
+
 class Coupling {
  public:
   virtual ~Coupling() = default;
@@ -72,14 +80,10 @@ class Coupling {
 
   /// How far each body has been moved back by whole periods since the start, um, of cells those of membranes(); copies to the host.
   virtual std::vector<Triple> wrapped_by() const = 0;
-  /// Of the fluid on the cells, nW, where no tractions tell.
-  virtual double power_on_cells() { return 0; }
-  /// Friction beside the membranes that the grid does not show, nW.
-  virtual double unresolved_dissipation() { return 0; }
-
-  /// Of forces on the cells from outside, nW, and what the contacts between them have stored after a step of that length, fJ.
+  /// Of this rank, where no tractions tell, after a step of that length.
+  virtual CellEnergy energy_of_cells(double /*dt_us*/) { return {}; }
+  /// Of forces on the cells from outside, nW.
   virtual double power_of_pushes() { return 0; }
-  virtual double contact_energy(double) { return 0; }
   /// Of cells that touch a rigid body on it, nN, and its power, nW, after a step of that length. All ranks call.
   virtual std::array<double, 4> contact_load(int /*body*/, double /*dt_us*/) { return {}; }
   /// How contacts went; nothing without [contact].
@@ -103,9 +107,8 @@ class Coupling {
   virtual RigidBodies* rigid_bodies() { return nullptr; }
   /// The search and the flow at surfaces that cut the grid, those of membranes that are shared out not among them; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
-  /// Of cells on sides that move, past the fluid, nW: what spreads their forces reaches a side beside them.
-  virtual double power_on_sides() { return 0; }
-  /// The same with other velocities of the sides. @param of_sides  [cell, 3], read on the sides of the block
+  /// Of cells on sides, past the fluid, nW: what spreads their forces reaches a side beside them.
+  /// @param of_sides  velocity [cell, 3], read on the sides of the block
   virtual double power_on_sides(const Components<double>&) { return 0; }
 };
 

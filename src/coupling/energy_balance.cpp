@@ -57,11 +57,15 @@ std::optional<double> share(double left_over, double scale, double floor) {
 void EnergyBalance::add_shared_cells(EnergyTotals& now) {
   Coupling& coupling = *simulation_.coupling();
   const double dt = simulation_.last_step_us() > 0 ? simulation_.last_step_us() : simulation_.next_step_us();
-  now.on_cells = coupling.power_on_cells();
-  now.boundaries -= coupling.power_on_sides();
-  now.dissipation += coupling.unresolved_dissipation();
+  const CellEnergy here = coupling.energy_of_cells(dt);
+  double all[5] = {here.on_cells, here.on_sides, here.unresolved, here.contact, simulation_.membranes()->dissipation_nW()};
+  simulation_.grid().comm().sum(all, 5);
+  now.on_cells = all[0];
+  now.boundaries -= all[1];
+  now.dissipation += all[2];
+  now.contact = all[3];
+  now.membrane_dissipation = all[4];
   now.pushed = coupling.power_of_pushes();
-  now.contact = coupling.contact_energy(dt);
   const int bodies = coupling.rigid_bodies() ? coupling.rigid_bodies()->count() : 0;
   for (int body = 0; body < bodies; ++body) now.on_bodies += coupling.contact_load(body, dt)[3];
 }
@@ -89,9 +93,10 @@ void EnergyBalance::sample(double elastic_fJ) {
   if (simulation_.shared_cells()) add_shared_cells(now);
   if (auto* membranes = simulation_.membranes()) {
     now.elastic = elastic_fJ;
-    now.membrane_dissipation = membranes->dissipation_nW();
-    if (simulation_.shared_cells()) now.membrane_dissipation = simulation_.grid().comm().sum(now.membrane_dissipation);
-    if (!simulation_.shared_cells()) now.membrane_kinetic = membranes->kinetic_energy_fJ();
+    if (!simulation_.shared_cells()) {
+      now.membrane_dissipation = membranes->dissipation_nW();
+      now.membrane_kinetic = membranes->kinetic_energy_fJ();
+    }
   }
   if (state_.samples == 0) {
     state_.first = now;

@@ -320,16 +320,20 @@ SlipViews ForceCoupling::slip_of_membranes() const {
   return transfer_->slip(surfaces(), forces(), fluid_.viscosity(), type, loads_ ? loads_->gaps() : Array<double>(), followed_);
 }
 
-double ForceCoupling::unresolved_dissipation() {
-  double loss = face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
-  if (scene_.coupling->slip) loss += slip_power(transfer_->block(), slip_of_membranes(), transfer_->views());
-  return fluid_.grid().comm().sum(loss) + loss_beside_bodies();
-}
-
-double ForceCoupling::power_on_sides() {
+CellEnergy ForceCoupling::energy_of_cells(double dt_us) {
+  CellEnergy energy;
+  const bool has_slip = scene_.coupling->slip;
+  const SlipViews slip = has_slip ? slip_of_membranes() : SlipViews{};
+  energy.on_cells = -power_of(membranes_->vertices(), membranes_->views().force, surfaces().v);
   const auto moves = [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::moving_wall; };
-  if (std::none_of(scene_.boundaries.begin(), scene_.boundaries.end(), moves)) return 0;
-  return power_on_sides(fluid_.velocity());
+  if (std::any_of(scene_.boundaries.begin(), scene_.boundaries.end(), moves))
+    energy.on_sides = transfer_->power_on_sides(forces(), fluid_.velocity(), has_slip ? &slip : nullptr);
+  energy.unresolved = face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
+  if (has_slip) energy.unresolved += slip_power(transfer_->block(), slip, transfer_->views());
+  const double beside_bodies = loss_beside_bodies();  // of all ranks
+  if (fluid_.grid().comm().rank() == 0) energy.unresolved += beside_bodies;
+  if (loads_) energy.contact = loads_->contact_energy(dt_us);
+  return energy;
 }
 
 double ForceCoupling::power_on_sides(const Components<double>& of_sides) {
@@ -343,11 +347,6 @@ const Components<double>& ForceCoupling::tractions_for_output() {
   traction_ = Components<double>(workspace_->reserve(3 * vertices), vertices, 3);
   force_per_area(membranes_->vertices(), forces(), surfaces().area, -1, traction_);
   return traction_;
-}
-
-double ForceCoupling::power_on_cells() {
-  const double here = power_of(membranes_->vertices(), membranes_->views().force, surfaces().v);
-  return -fluid_.grid().comm().sum(here);
 }
 
 std::vector<Triple> ForceCoupling::wrapped_by() const {

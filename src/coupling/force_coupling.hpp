@@ -32,12 +32,9 @@ class ForceCoupling : public Coupling {
   std::string outflow_limit(double dt_us) const override;
   std::string coarse() const override { return coarse_; }
   std::map<std::string, double> report(double dt_us) const override;
-  double power_on_cells() override;
-  double unresolved_dissipation() override;
-  double power_on_sides() override;
+  CellEnergy energy_of_cells(double dt_us) override;
   double power_on_sides(const Components<double>& of_sides) override;
   double power_of_pushes() override { return loads_ ? loads_->power_of_pushes() : 0; }
-  double contact_energy(double dt_us) override { return loads_ ? loads_->contact_energy(dt_us) : 0; }
   std::optional<ContactReport> contact_report() const override { return loads_ ? loads_->report() : std::nullopt; }
   void resume_contact(const ContactReport& report) override {
     if (loads_) loads_->resume(report);

@@ -10,6 +10,8 @@ namespace corpuscle {
 
 void ForceCoupling::watch_outflow() {
   outflow_ = {};
+  const auto open = [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::outflow; };
+  if (std::none_of(scene_.boundaries.begin(), scene_.boundaries.end(), open)) return;
   for (const auto& boundary : scene_.boundaries) {
     const int side = static_cast<int>(boundary.side), d = side / 2, end = side % 2;
     const auto& lattice = transfer_->block().lattice;

@@ -95,7 +95,7 @@ void ForceCoupling::warn_of_pressed_start() const {
     elastic += shear_modulus(type.in_plane) * type.law.rest_area;
   }
   elastic = comm.sum(elastic);
-  const double contact = loads_->contact_energy(lengths_us_.front());
+  const double contact = comm.sum(loads_->contact_energy(lengths_us_.front()));
   if (!(contact > much * elastic)) return;
   const ContactReport report = *loads_->report();
   warn("contact: cells start pressed against each other or against walls, with gaps down to {:.2g} um: contact gives off up to {:.3g} fJ, "

@@ -159,7 +159,7 @@ TEST_CASE("contact with a wall has its energy from the start, and its gap is tol
   const double start = lowest();
   CHECK(start < 0.2);
   CHECK(simulation.coupling()->contact_report()->smallest_wall_gap == Approx(start).margin(1e-9));  // places in the grid
-  CHECK(simulation.coupling()->contact_energy(scene.time.step_us) > 1e-3);
+  CHECK(simulation.grid().comm().sum(simulation.coupling()->energy_of_cells(scene.time.step_us).contact) > 1e-3);
   sample();
   while (!simulation.done()) simulation.step(), sample();
   CHECK(simulation.coupling()->contact_report()->smallest() == Approx(start).margin(1e-9));  // it has moved away
@@ -266,7 +266,7 @@ TEST_CASE("pressed cells on several ranks move as on one", "[coupling][contact][
   while (!alone.done()) alone.step(), shared.step(), sample();
   const ContactReport one = *alone.coupling()->contact_report(), all = *shared.coupling()->contact_report();
   CHECK(one.smallest_gap < 0.25);
-  CHECK(alone.coupling()->contact_energy(20) > 0);
+  CHECK(alone.coupling()->energy_of_cells(20).contact > 0);
   CHECK(largest_difference(positions(alone), positions(shared)) <
         1e-9);  // um: round-off, and the solvers' last residuals
   // Every rank has the figures of all.
