@@ -357,6 +357,8 @@ TEST_CASE("a multigrid cycle is that of one rank however the grid is cut", "[flu
         {{23, 19, 33}, {6, 5, 24}, {false, false, true}},   // pairs that two ranks share
         {{26, 22, 50}, {6, 5, 24}, {true, false, false}},
         {{14, 16, 18}, {3, 3, 3}, {true, true, true}},
+        {{14, 36, 18}, {3, 8, 4}, {true, false, true}},     // cut along a direction before one that wraps
+        {{36, 14, 16}, {8, 3, 4}, {false, true, true}},
         {{40, 42, 44}, {3, 3, 3}, {false, true, false}}}) {  // more than one level below the finest is cut
     INFO(cells[0] << " x " << cells[1] << " x " << cells[2] << " cells");
     auto shared = make_cycles(Comm(), cells, upper, periodic), alone = make_cycles(Comm::alone(), cells, upper, periodic);
