@@ -268,6 +268,7 @@ void for_box_rounded(const std::string& label, const IndexSpace& index, const Ce
 #endif
   for_box(label, box.lower, upper, body);
 }
+/// The same for the owned cells.
 template <class Body>
 void for_owned_rounded(const std::string& label, const IndexSpace& index, const Body& body) {
   for_box_rounded(label, index, {{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}}, body);

@@ -57,7 +57,8 @@ class CellLoads {
 
   /// Of the pushes, nW, on membranes of the present velocity.
   double power_of_pushes() const;
-  /// fJ, on this rank, of the contacts between cells as look() saw them and with walls at present. After Transfer::place(), or a move since then.
+  /// fJ, on this rank, of the contacts between cells as look() saw them and with walls at present. After Transfer::place(), or
+  /// a move since then.
   double contact_energy(double dt_us) const;
   /// um, where the repulsion of steps of that length goes on as its tangent; 0 without contact.
   double knee_um(double dt_us) const { return contact_ ? contact_->law(dt_us).knee : 0; }

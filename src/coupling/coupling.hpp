@@ -80,7 +80,7 @@ class Coupling {
 
   /// How far each body has been moved back by whole periods since the start, um, of cells those of membranes(); copies to the host.
   virtual std::vector<Triple> wrapped_by() const = 0;
-  /// Of this rank, where no tractions tell, after a step of that length.
+  /// This rank's share, where no tractions tell, after a step of that length. All ranks call.
   virtual CellEnergy energy_of_cells(double /*dt_us*/) { return {}; }
   /// Of forces on the cells from outside, nW.
   virtual double power_of_pushes() { return 0; }

@@ -134,7 +134,7 @@ void MultigridCycle<Field>::smooth_up(std::size_t number) {
   int known = 0;
   for (int n = 0; n < smoothing_.steps; ++n) {
     if (known == 0) {
-      known = std::min(layers_exchanged(number), smoothing_.steps - n);
+      known = n == 0 ? layers_exchanged(number) : 1;  // later ones read `previous`, too, which is not exchanged
       // What is done in other ranks' layers reads images of those, too.
       known > 1 ? halo.exchange(level.x, known) : halo.exchange_with_others(level.x, known);
     }

@@ -139,12 +139,7 @@ Halo::Halo(const Comm& comm, const IndexSpace& index, const std::array<int, 3>& 
   }
 }
 
-bool Halo::cut() const {
-  for (const auto& sides : neighbour_)
-    for (int rank : sides)
-      if (rank >= 0 && rank != comm_.rank()) return true;
-  return false;
-}
+bool Halo::cut() const { return with_others(1).size() > index_.owned(); }
 
 CellBox Halo::with_others(int layers) const {
   CellBox box;

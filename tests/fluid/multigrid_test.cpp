@@ -350,6 +350,21 @@ double difference(const IndexSpace& part, const IndexSpace& whole, const Value& 
 
 }  // namespace
 
+TEST_CASE("coarse levels are gathered on a number of ranks that is no power of two", "[fluid][ranks]") {
+  if (Comm().size() < 4) return;
+  MPI_Comm some;
+  MPI_Comm_split(MPI_COMM_WORLD, Comm().rank() < 3, 0, &some);
+  if (Comm().rank() < 3) {
+    const std::array<int, 3> cells{24, 20, 33};
+    const Comm three(some);
+    auto shared = make_cycles(three, cells, {6, 5, 8}, {false, false, true});
+    auto alone = make_cycles(Comm::alone(), cells, {6, 5, 8}, {false, false, true});
+    shared->pressure->run(), alone->pressure->run();
+    CHECK(difference(shared->grid.index(), alone->grid.index(), shared->pressure->finest().x, alone->pressure->finest().x) < 1e-5);  // single precision
+  }
+  MPI_Comm_free(&some);
+}
+
 TEST_CASE("a multigrid cycle is that of one rank however the grid is cut", "[fluid][ranks]") {
   using Bool = std::array<bool, 3>;
   for (const auto& [cells, upper, periodic] :
