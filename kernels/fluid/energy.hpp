@@ -92,38 +92,51 @@ inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& 
   });
 }
 
-/// Power that enters through the boundary faces of one end (0 low, 1 high) of direction d, nW: pressure, viscous stress, and
-/// the kinetic energy that the flow carries, with `rho` zero where convection is left out. Second: the volume that flows
-/// in, um3/us. Pressure on a face without one of its own is extended from the two nodes beside it.
+/// Sides of the grid: boxes of boundary nodes, each with its direction and end (0 low, 1 high).
+struct GridSides {
+  CellBoxes boxes;
+  int direction[CellBoxes::most], end[CellBoxes::most];
+
+  void add(const IndexSpace& index, int d, int at_end) {
+    CellBox box{{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
+    box.lower[d] = at_end == 0 ? -1 : index.n[d];
+    box.upper[d] = box.lower[d] + 1;
+    direction[boxes.count] = d, end[boxes.count] = at_end;
+    boxes.add(box);
+  }
+};
+
+/// Power that enters through the boundary faces of the sides, nW: pressure, viscous stress, and the kinetic energy that the flow
+/// carries, with `rho` zero where convection is left out. Second: the volume that flows in, um3/us. Pressure on a face without one of
+/// its own is extended from the two nodes beside it.
 template <bool skewed>
 Sums<2> boundary_power(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
                        const PressureMask& mask, double rho, double mu, const Components<double>& u,
-                       const Array<double>& p, const Array<double>& flux, int d, int end) {
+                       const Array<double>& p, const Array<double> (&flux)[3], const GridSides& sides) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
-  CellBox box{{0, 0, 0}, {index.n[0], index.n[1], index.n[2]}};
-  box.lower[d] = end == 0 ? -1 : index.n[d];
-  box.upper[d] = box.lower[d] + 1;
-  const int n0 = box.upper[0] - box.lower[0], n1 = box.upper[1] - box.lower[1], n2 = box.upper[2] - box.lower[2];
-  const int lower0 = box.lower[0], lower1 = box.lower[1], lower2 = box.lower[2];
-  const int inward = end == 0 ? index.stride(d) : -index.stride(d), outward = end == 0 ? -1 : 1;
+  const GridSides of = sides;
+  const Kokkos::Array<Array<double>, 3> through{flux[0], flux[1], flux[2]};
   Sums<2> result;
   Kokkos::parallel_reduce(
-      "corpuscle::fluid::boundary_power", Policy(0, n0 * n1 * n2),
+      "corpuscle::fluid::boundary_power", Policy(0, sides.boxes.size()),
       KOKKOS_LAMBDA(int e, Sums<2>& sum) {
-        const int b = index.cell(lower0 + e % n0, lower1 + (e / n0) % n1, lower2 + e / (n0 * n1));
-        const int c = b + inward, next = c + inward, face = end == 0 ? c : b;
-        double pressure = p(c);
-        if (mask(b)) {
-          pressure = p(b);
-        } else if (kind(next) == NodeKind::fluid || kind(next) == NodeKind::immersed) {
-          pressure += norm(load(x, b) - load(x, c)) / norm(load(x, c) - load(x, next)) * (p(c) - p(next));
-        }
-        const double out = outward * flux(face);
-        double viscous = 0;
-        for (int m = 0; m < 3; ++m) viscous += outward * mu * viscous_face<skewed>(g, u, index, d, face, m) * u(b, m);
-        sum[0] += viscous - (pressure + 0.5 * rho * dot(load(u, b), load(u, b))) * out;
-        sum[1] += out < 0 ? -out : 0.0;
+        of.boxes.visit(e, [&](int side, int i, int j, int k) {
+          const int d = of.direction[side], end = of.end[side], b = index.cell(i, j, k);
+          const int inward = end == 0 ? index.stride(d) : -index.stride(d), outward = end == 0 ? -1 : 1;
+          const int c = b + inward, next = c + inward, face = end == 0 ? c : b;
+          double pressure = p(c);
+          if (mask(b)) {
+            pressure = p(b);
+          } else if (kind(next) == NodeKind::fluid || kind(next) == NodeKind::immersed) {
+            pressure += norm(load(x, b) - load(x, c)) / norm(load(x, c) - load(x, next)) * (p(c) - p(next));
+          }
+          const double out = outward * through[d](face);
+          double viscous = 0;
+          for (int m = 0; m < 3; ++m) viscous += outward * mu * viscous_face<skewed>(g, u, index, d, face, m) * u(b, m);
+          sum[0] += viscous - (pressure + 0.5 * rho * dot(load(u, b), load(u, b))) * out;
+          sum[1] += out < 0 ? -out : 0.0;
+        });
       },
       Kokkos::Sum<Sums<2>>(result));
   return result;

@@ -206,19 +206,20 @@ void apply_momentum(const Operator& a, const Array<float>& inverse, const Compon
   });
 }
 
-/// residual = (history - V grad p) / mu - A u at fluid nodes, zero elsewhere; returns this rank's sum of squares of
-/// `inverse` times it, which is a velocity.
+/// residual = (history - V grad p) / mu - A u at fluid nodes, zero elsewhere; this rank's sums of squares of `inverse` times it, which
+/// is a velocity, and of u.
 template <class Operator>
-double momentum_residual(const Operator& a, double mu, const Components<double>& history, const Components<double>& grad_p,
-                         const Components<double>& u, const Array<float>& inverse, const Components<float>& residual) {
+void momentum_residual(const Operator& a, double mu, const Components<double>& history, const Components<double>& grad_p,
+                       const Components<double>& u, const Array<float>& inverse, const Components<float>& residual,
+                       const Kokkos::View<Sums<2>, Memory>& sums) {
   a.prepare(u);
-  return sum_owned("corpuscle::fluid::momentum_residual", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
+  sums_owned("corpuscle::fluid::momentum_residual", a.index, KOKKOS_LAMBDA(int i, int j, int k) {
     const int c = a.index.cell(i, j, k);
     const double fluid = inverse(c) > 0 ? 1 : 0, scale = 1 / mu;
     const Vec3 left = fluid * (scale * (load(history, c) - a.volume(c) * load(grad_p, c)) - a.apply(u, c));
     residual(c, 0) = left.x, residual(c, 1) = left.y, residual(c, 2) = left.z;
-    return inverse(c) * inverse(c) * dot(left, left);
-  });
+    return Sums<2>{{inverse(c) * inverse(c) * dot(left, left), dot(load(u, c), load(u, c))}};
+  }, sums);
 }
 
 /// The part of the right-hand side that does not change within a step, [cell, 3], nN:
@@ -266,14 +267,6 @@ inline void subtract_convection(const GridViews& grid, const Array<NodeKind>& ki
   });
 }
 
-/// This rank's sum of squares of a vector field over owned cells.
-inline double square_of(const IndexSpace& index, const Components<double>& u) {
-  return sum_owned("corpuscle::fluid::square", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const Vec3 v = load(u, index.cell(i, j, k));
-    return dot(v, v);
-  });
-}
-
 /// Diagonal of the velocity's multigrid over mu without the faces between fluid nodes: inertia, and the faces to nodes whose
 /// velocity is known. `natural`: sides with a condition on the derivative, which conduct nothing.
 inline void velocity_own_diagonal(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
@@ -297,7 +290,10 @@ inline void velocity_own_diagonal(const GridViews& grid, const ViscousCoefficien
   });
 }
 
-/// This rank's sum of inverse^2 a . b: the inner product of residuals, scaled to velocities.
+// Inner products of residuals, scaled to velocities; not in the operator's own loop, where sums in double precision would make it take
+// four times as long.
+
+/// This rank's sum of inverse^2 a . b.
 inline double scaled_dot(const IndexSpace& index, const Array<float>& inverse, const Components<float>& a,
                          const Components<float>& b) {
   return sum_owned("corpuscle::fluid::scaled_dot", index, KOKKOS_LAMBDA(int i, int j, int k) {

@@ -191,17 +191,15 @@ inline void seed_open_fluid(const IndexSpace& index, const NodeBox& box, const O
       });
 }
 
-/// Carry `reached` along the grid lines of a direction, both ways, through fluid nodes. @returns how many were new.
-inline int reach_along(const IndexSpace& index, const NodeBox& box, int direction, const NodeViews& nodes,
-                       const Array<std::int8_t>& reached) {
+/// Carry `reached` along the grid lines of a direction, both ways, through fluid nodes.
+inline void reach_along(const IndexSpace& index, const NodeBox& box, int direction, const NodeViews& nodes,
+                        const Array<std::int8_t>& reached) {
   const int d1 = (direction + 1) % 3, d2 = (direction + 2) % 3;
   const int lines1 = box.extent(d1), lines2 = box.extent(d2), length = box.extent(direction);
   const int stride = index.stride(direction);
   const auto kind = nodes.kind;
-  int added = 0;
-  Kokkos::parallel_reduce(
-      "corpuscle::immersed::reach_along", Policy(0, length > 0 ? lines1 * lines2 : 0),
-      KOKKOS_LAMBDA(int e, int& sum) {
+  Kokkos::parallel_for(
+      "corpuscle::immersed::reach_along", Policy(0, length > 0 ? lines1 * lines2 : 0), KOKKOS_LAMBDA(int e) {
         int i[3];
         i[direction] = box.lower[direction];
         i[d1] = box.lower[d1] + e % lines1;
@@ -217,41 +215,42 @@ inline int reach_along(const IndexSpace& index, const NodeBox& box, int directio
               carried = true;
             } else if (carried) {
               reached(c) = 1;
-              sum += 1;
             }
           }
         }
-      },
-      added);
-  return added;
+      });
 }
 
-/// Carry `reached` as far as it goes within the box. @returns how many nodes were new.
-inline int reach_all(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
-                     const Array<std::int8_t>& reached) {
-  int total = 0;
-  for (int added = 1; added > 0; total += added) {
-    added = 0;
-    for (int d = 0; d < 3; ++d) added += reach_along(index, box, d, nodes, reached);
-  }
-  return total;
-}
-
-/// Owned fluid nodes of the box that have not been reached.
-inline int count_unreached(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
-                           const Array<std::int8_t>& reached) {
+/// Fluid nodes of the box that have not been reached: owned ones, and all.
+inline Sums<2> count_unreached(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
+                               const Array<std::int8_t>& reached) {
   const auto kind = nodes.kind;
-  int unreached = 0;
+  Sums<2> unreached;
   Kokkos::parallel_reduce(
       "corpuscle::immersed::count_unreached", Policy(0, box.size()),
-      KOKKOS_LAMBDA(int e, int& sum) {
+      KOKKOS_LAMBDA(int e, Sums<2>& sum) {
         int i[3];
         box.unpack(e, i);
         const int c = index.cell(i[0], i[1], i[2]);
-        if (index.owns(i[0], i[1], i[2]) && kind(c) == NodeKind::fluid && !reached(c)) sum += 1;
+        if (kind(c) != NodeKind::fluid || reached(c)) return;
+        sum[0] += index.owns(i[0], i[1], i[2]) ? 1 : 0;
+        sum[1] += 1;
       },
-      unreached);
+      Kokkos::Sum<Sums<2>>(unreached));
   return unreached;
+}
+
+/// Carry `reached` as far as it goes within the box. @returns how many owned fluid nodes it does not reach
+inline long reach_all(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes, const Array<std::int8_t>& reached) {
+  Sums<2> left;
+  double before;
+  left[1] = box.size() + 1.0;
+  do {
+    before = left[1];
+    for (int d = 0; d < 3; ++d) reach_along(index, box, d, nodes, reached);
+    left = count_unreached(index, box, nodes, reached);
+  } while (left[0] > 0 && left[1] < before);
+  return static_cast<long>(left[0]);
 }
 
 /// Fluid nodes of the box that have not been reached become immersed: fluid that a surface's folds close in, on the grid,

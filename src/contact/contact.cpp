@@ -237,6 +237,7 @@ void Contact::make_lists(const StepWays& ways, double dt) {
   if (surface_.vertices == 0) return;  // on this rank, at present
   if (lists_hold(ways, dt)) return;
   const TriangleBounds bounds = bounds_of_triangles(surface_);
+  refuse_far_away(bounds);
   copy_rounded(surface_.vertices, surface_.x, listed_);
   const StepWays ahead = choose_motion(bounds, dt);
   const double way = ahead.whole + 0.5 * steepest_ * dt * (reach_.other + 2 * bounds.radius);

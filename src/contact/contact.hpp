@@ -113,6 +113,7 @@ class Contact {
   std::string crossing_text(int contact) const;
   std::string place_text(int vertex) const;
   std::string pair_text(int vertex, int item) const;
+  void refuse_far_away(const TriangleBounds& bounds) const;
   StepWays refuse_runaways(double time_us, double dt);
   void refuse_fast_passage(double time_us, double dt);
   void refuse(const LongestWay& found, double most, const std::function<std::string()>& text) const;

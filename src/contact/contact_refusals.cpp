@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "contact/contact.hpp"
 #include "contact/step_ways.hpp"
@@ -31,6 +32,20 @@ int countable_items(std::int64_t items) {
                                        "ranks, fewer cells, or a smaller contact.range_um",
                                        static_cast<double>(items), static_cast<double>(most)));
   return static_cast<int>(items);
+}
+
+/// Lists are of places in single precision: where those are no finer than the range, all is near to all.
+/// @throws ComputationError
+void Contact::refuse_far_away(const TriangleBounds& bounds) const {
+  constexpr double share = 0.1;  // of the range
+  double furthest = 0;
+  for (int d = 0; d < 3; ++d) furthest = std::max({furthest, -bounds.lower[d], bounds.upper[d]});
+  const double apart = std::numeric_limits<float>::epsilon() * furthest;
+  if (apart > share * settings_.range_um)
+    throw ComputationError(fmt::format("contact: a surface is {:.3g} um from the origin, where places are kept to {:.2g} um, too coarse for "
+                                       "contact.range_um = {:g}. Likely cause: a step too long for the flow, or a load without bound: reduce "
+                                       "time.step_us or the load, or move the grid to the origin",
+                                       furthest, apart, settings_.range_um));
 }
 
 /// Before lists are made: they reach as far as anything may come from, and would take in all of a scene that flies apart.

@@ -22,15 +22,13 @@ FluidEnergy flow_energy(FluidSolver& fluid, double body_volume) {
   fluid.visit_varying_viscosity([&](const VaryingViscosity& viscosity) {
     sums[EnergyColumn::gradient_square] += excess_dissipation(views, viscosity, fluid.kind(), u);
   });
-  sums[columns] = sums[columns + 1] = 0;
+  GridSides sides;
   for (int d = 0; d < 3; ++d)
-    for (int end = 0; end < 2; ++end) {
-      if (fluid.grid().halo().neighbour(d, end) >= 0) continue;
-      const auto power = fluid.skewed() ? boundary_power<true> : boundary_power<false>;
-      const auto side = power(views, g, fluid.kind(), fluid.pressure_mask(), carried, mu, u, fluid.pressure(), fluid.flux()[d], d, end);
-      sums[columns] += side[0];
-      sums[columns + 1] += side[1];
-    }
+    for (int end = 0; end < 2; ++end)
+      if (fluid.grid().halo().neighbour(d, end) < 0) sides.add(views.index, d, end);
+  const auto power = fluid.skewed() ? boundary_power<true> : boundary_power<false>;
+  const Sums<2> through = sides.boxes.count == 0 ? Sums<2>{} : power(views, g, fluid.kind(), fluid.pressure_mask(), carried, mu, u, fluid.pressure(), fluid.flux(), sides);
+  std::copy_n(through.value, 2, sums + columns);
   grid.comm().sum(sums, columns + 2);
   // Immersed nodes fill the rest of the fluid's volume, each by the same share on average.
   using Column = EnergyColumn;

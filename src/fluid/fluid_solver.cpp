@@ -321,6 +321,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   for (int round = 0;; ++round) {
     negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
     const double largest = grid_->comm().max(largest_magnitude(negative_divergence_));
+    statistics_.divergence = largest;
     if (largest <= (round > 0 ? 1.5 * target : 0.0)) break;
     const auto result = round < rounds ? solve_pressure(round > 0 ? target : share * target) : KrylovResult{};
     statistics_.pressure_iterations += result.iterations;
@@ -368,8 +369,6 @@ void FluidSolver::solve(double time, const EmbeddedBodies* bodies) {
     apply_pressure_rows(bodies->pressure, bodies->rows, p_);
     grid_->halo().exchange(p_);
   }
-  negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
-  statistics_.divergence = grid_->comm().max(largest_magnitude(negative_divergence_));
 }
 
 std::vector<int> FluidSolver::multigrid_cells() const {

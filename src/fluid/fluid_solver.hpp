@@ -153,7 +153,8 @@ class FluidSolver {
   void with_operator(const Use& use) const;
   template <class Viscosity, class Use>
   void with_operator(const Viscosity& viscosity, const Use& use) const;
-  double residual_square();
+  std::array<double, 2> two_sums();
+  std::array<double, 2> residual_squares();
   void update_momentum_cycle();
   int momentum_depth() const;
   template <class Velocity>

@@ -46,27 +46,26 @@ class FluidSolver::Correction {
   Correction(FluidSolver& fluid, const EmbeddedBodies* bodies)
       : f_(fluid), m_(*fluid.momentum_), finest_(m_.cycle.levels()[0]), index_(fluid.grid_->index()), bodies_(bodies) {}
 
-  double start() {
+  void start() {
     Kokkos::deep_copy(Exec(), m_.shadow, m_.r);
     Kokkos::deep_copy(Exec(), m_.p, m_.r);
-    return dot(m_.r, m_.r);
   }
   double apply_p() {
     apply(m_.p, m_.v);
-    return dot(m_.shadow, m_.v);
+    return f_.grid_->comm().sum(scaled_dot(index_, finest_.views.inverse, m_.shadow, m_.v));
   }
   std::array<double, 2> apply_r() {
     apply(m_.r, m_.t);
     scaled_dots(index_, finest_.views.inverse, m_.t, m_.r, m_.two);
-    return sums();
+    return f_.two_sums();
   }
   double advance_v(double alpha) {
     advance_velocity(index_, finest_.views.inverse, alpha, finest_.x, m_.v, m_.shadow, f_.u_, m_.r, m_.two);
-    return sums()[0];
+    return f_.two_sums()[0];
   }
   std::array<double, 2> advance_t(double omega) {
     advance_velocity(index_, finest_.views.inverse, omega, finest_.x, m_.t, m_.shadow, f_.u_, m_.r, m_.two);
-    return sums();
+    return f_.two_sums();
   }
   void next_p(double beta, double w) { next_direction(index_, beta, w, m_.r, m_.v, m_.p); }
 
@@ -85,18 +84,6 @@ class FluidSolver::Correction {
     }
     f_.with_operator([&](const auto& a) { apply_momentum(a, finest_.views.inverse, direction, image); });
   }
-  double part(const Components<float>& a, const Components<float>& b) const {
-    return scaled_dot(index_, finest_.views.inverse, a, b);
-  }
-  /// Over all ranks.
-  std::array<double, 2> sums() const {
-    Sums<2> both = m_.two_host.read()();
-    f_.grid_->comm().sum(both.value, 2);
-    return {both[0], both[1]};
-  }
-  double dot(const Components<float>& a, const Components<float>& b) const {
-    return f_.grid_->comm().sum(part(a, b));
-  }
 
   FluidSolver& f_;
   Momentum& m_;
@@ -105,14 +92,19 @@ class FluidSolver::Correction {
   const EmbeddedBodies* bodies_;
 };
 
-/// Square of this rank's momentum residual with the present pressure and velocity, (um/us)^2, summed over nodes.
-double FluidSolver::residual_square() {
-  double square = 0;
+/// Over all ranks, of the last reduction of two.
+std::array<double, 2> FluidSolver::two_sums() {
+  Sums<2> both = momentum_->two_host.read()();
+  grid_->comm().sum(both.value, 2);
+  return {both[0], both[1]};
+}
+
+/// Squares of the momentum residual with the present pressure and velocity, and of the velocity, (um/us)^2, summed over nodes.
+std::array<double, 2> FluidSolver::residual_squares() {
   with_operator([&](const auto& a) {
-    square = corpuscle::momentum_residual(a, mu_, history_, grad_p_, u_, momentum_->cycle.levels()[0].views.inverse,
-                                          momentum_->r);
+    corpuscle::momentum_residual(a, mu_, history_, grad_p_, u_, momentum_->cycle.levels()[0].views.inverse, momentum_->r, momentum_->two);
   });
-  return square;
+  return two_sums();
 }
 
 /// The residual's 2-norm over all nodes, kept in residual_norm_, over that of the velocity.
@@ -120,12 +112,11 @@ double FluidSolver::momentum_residual() {
   const auto scope = timers_->scope("momentum");
   grid_->halo().exchange(p_);
   with_face_force([&](const auto& force) { pressure_gradient(grid_->views(), kind_, mask_, p_, grad_p_, force); });
-  double squares[2] = {residual_square(), square_of(grid_->index(), u_)};
-  grid_->comm().sum(squares, 2);
-  residual_norm_ = std::sqrt(squares[0]);
-  velocity_norm_ = std::sqrt(squares[1]);
+  const auto [residual, velocity] = residual_squares();
+  residual_norm_ = std::sqrt(residual);
+  velocity_norm_ = std::sqrt(velocity);
   const double floor = 1e-30 + statistics_.reference_speed * statistics_.reference_speed;
-  return residual_norm_ / std::sqrt(std::max(squares[1], floor));
+  return residual_norm_ / std::sqrt(std::max(velocity, floor));
 }
 
 /// A share of the velocity is no small share of what drives a slow flow: where less than that is asked for in a step, nothing
@@ -154,12 +145,12 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
   const double start = residual_norm_;
   int iterations = 0;
   while (residual_norm_ > target && iterations < settings_.max_iterations) {
-    const auto result = bicgstab(correction, std::max(margin * target, least_reduction * residual_norm_),
+    const auto result = bicgstab(correction, residual_norm_ * residual_norm_, std::max(margin * target, least_reduction * residual_norm_),
                                  settings_.max_iterations - iterations);
     if (result.iterations == 0) break;  // not finite in single precision
     iterations += result.iterations;
     complete_velocity(bodies);
-    residual_norm_ = std::sqrt(grid_->comm().sum(residual_square()));
+    residual_norm_ = std::sqrt(residual_squares()[0]);
   }
   statistics_.momentum_iterations += iterations;
   if (residual_norm_ <= target) return;

@@ -257,8 +257,7 @@ int ImmersedBoundary::absorb_pockets(const NodeBox& box) {
   }
   const IndexSpace& index = grid_.index;
   const auto left = [&] {
-    reach_all(index, box, nodes_, reached_);
-    const long own = count_unreached(index, box, nodes_, reached_);
+    const long own = reach_all(index, box, nodes_, reached_);
     return options_.sum ? options_.sum(own) : own;
   };
   if (options_.exchange) Kokkos::deep_copy(Exec(), reached_, std::int8_t{1});  // beyond the box, which another rank's may overlap

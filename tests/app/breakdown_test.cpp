@@ -50,6 +50,12 @@ TEST_CASE("a membrane that is torn: a report, the last good checkpoint is named,
 #endif
 }
 
+TEST_CASE("cells driven so fast that their places are too coarse for contact end the run, and do not look for contacts for ever") {
+  const auto folder = fresh_folder("far_away");
+  fail(folder, {"run", CORPUSCLE_SOURCE_DIR "/cases/two_cells.toml", "--out", "out", "--set", "fluid.pressure_gradient_Pa_per_um=[1e9, 0, 0]", "--set", "output.fields=false"}, 3,
+       {"broke down", "contact: a surface is", "um from the origin", "contact.range_um", "time.step_us"});
+}
+
 TEST_CASE("a run that breaks down on a grid too coarse for its cell names the grid, one on a fine grid does not") {
   const auto run = [](const std::string& nodes) {
     return coarse_tube("out", {"grid.nodes=" + nodes, "time.end_us=60", "boundary.0.velocity_mm_per_s=60", "boundary.0.ramp_us=1",
