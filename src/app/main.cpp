@@ -101,6 +101,7 @@ struct Command {
   int vertices = 0;
   std::string mesh_path;
   std::string section;
+  bool markdown = false, resolved = false;
 };
 
 /// @throws CLI::ParseError  the first word is none of the program's commands
@@ -128,7 +129,7 @@ Command parse(CLI::App& app, int argc, char** argv) {
   Command command;
   RunOptions& options = command.options;
   app.require_subcommand(1);
-  app.set_version_flag("--version", "corpuscle " + git_hash());
+  app.set_version_flag("--version", version_text(), "print version, git hash, back end and libraries, and exit");
   auto* run = app.add_subcommand("run", "run a case to its end");
   run->add_option("case", options.case_path, "case file (TOML)")->required();
   run->add_option("--out", options.folder, "folder for the results (default: runs/<case>-001 or the first number that is free, with runs/latest leading to it)");
@@ -143,12 +144,14 @@ Command parse(CLI::App& app, int argc, char** argv) {
   auto* check = app.add_subcommand("check", "validate a case; list modules, unknowns, memory and time; run nothing");
   check->add_option("case", options.case_path, "case file (TOML)")->required();
   check->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
+  check->add_flag("--resolved", command.resolved, "print the case with every default filled in, as a case file, and nothing else");
   auto* mesh = app.add_subcommand("mesh", "write the surface mesh of a resting red cell");
   mesh->add_option("--vertices", command.vertices, "how many vertices, 200 to 30000")->required();
   mesh->add_option("-o,--output", command.mesh_path, "file to write (.off or .stl)")->required();
 
-  auto* keys = app.add_subcommand("keys", "list every section and key of a case file, with defaults and what is allowed");
-  keys->add_option("section", command.section, "only this one: time, grid, fluid, boundary, cells, ...");
+  auto* keys = app.add_subcommand("keys", "list every section and key of a case file: what it says, what is allowed, its default");
+  auto* of = keys->add_option("section", command.section, "only this one: time, grid, fluid, boundary, cells, ...");
+  keys->add_flag("--markdown", command.markdown, "all of them as the tables of docs/keys.md")->excludes(of);
 
   std::vector<std::string> words;  // last first, as the parser wants them; Kokkos takes its own options
   for (int n = argc - 1; n > 0; --n)
@@ -183,9 +186,14 @@ int execute(const Comm& comm, const Command& command) {
     check_device_layout();
     switch (command.kind) {
       case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
-      case Command::Kind::check: check_case(comm, command.options); break;
+      case Command::Kind::check:
+        if (command.resolved)
+          print_resolved(comm, command.options);
+        else
+          check_case(comm, command.options);
+        break;
       case Command::Kind::mesh: write_mesh(command.vertices, command.mesh_path); break;
-      case Command::Kind::keys: info("{}", keys_text(command.section)); break;
+      case Command::Kind::keys: log_text(command.markdown ? keys_markdown() : keys_text(command.section)); break;
     }
     return static_cast<int>(exit_done);
   });

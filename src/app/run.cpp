@@ -17,6 +17,7 @@
 #include "output/checkpoint.hpp"
 #include "output/on_root.hpp"
 #include "output/run_folder.hpp"
+#include "output/text_file.hpp"
 
 #include <fmt/ranges.h>
 
@@ -31,7 +32,7 @@ namespace {
 
 void print_start(const Comm& comm, const Case& scene) {
   info("{}", scene.title.empty() ? scene.path : scene.title);
-  info("corpuscle {}, {} on {} rank{} x {} thread{}", git_hash(), backend_name(), comm.size(),
+  info("corpuscle {} ({}), {} on {} rank{} x {} thread{}", version_number(), git_hash(), backend_name(), comm.size(),
        comm.size() == 1 ? "" : "s", thread_count(), thread_count() == 1 ? "" : "s");
   print_modules(list_modules(scene, comm.size()));
   for (const auto& line : outputs_left_out(scene.output)) warn("{}", line);
@@ -185,6 +186,14 @@ std::optional<Continued> continued([[maybe_unused]] const std::string& checkpoin
   return std::nullopt;
 }
 
+/// The text of a case file that stands for the case and its overrides.
+std::string resolved_file(const RunOptions& options, const Case& scene) {
+  std::string from = options.case_path;
+  for (const auto& override_text : options.overrides) from += " --set " + override_text;
+  std::replace(from.begin(), from.end(), '\n', ' ');
+  return fmt::format("# {}\n# with every key that has a value in it, as corpuscle {} took them.\n{}", from, git_hash(), resolved_text(scene));
+}
+
 }  // namespace
 
 ExitCode run_case(const Comm& comm, const RunOptions& asked) {
@@ -203,7 +212,11 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   announce_set_up(measure_scene(scene, comm.size()));
-  const Place place{folder.path(), [&] { folder.begin(); }, folder.run(), fingerprint_files(comm, scene)};
+  const auto begin = [&, text = resolved_file(options, scene)] {
+    folder.begin();
+    on_root(comm, [&] { replace_text_file((std::filesystem::path(folder.path()) / "case.toml").string(), text); });
+  };
+  const Place place{folder.path(), begin, folder.run(), fingerprint_files(comm, scene)};
   Ending ending = run_scene(comm, std::move(scene), options, place);
   if (!coarser.empty() && ending.code == exit_done)
     ending.code = estimate_errors(comm, {file, options.overrides, coarser}, place, ending.report);
@@ -259,6 +272,10 @@ void check_case(const Comm& comm, const RunOptions& options) {
   info("estimate: {:.0f} MB, {} steps, about {:.2g} s, and {:.2g} s to set up", memory.rank() * comm.size(), simulation.steps_left(),
        estimate_steps_s(size), set_up_s);
   info("{} is valid", scene.path);
+}
+
+void print_resolved(const Comm& comm, const RunOptions& options) {
+  log_text(resolved_file(options, read_case(case_file(comm, options), options.overrides)));
 }
 
 void write_mesh(int vertices, const std::string& path) {

@@ -29,6 +29,9 @@ ExitCode run_case(const Comm& comm, const RunOptions& options);
 /// Validate a case and print modules, unknowns and estimates of memory and time; run nothing. @throws InputError
 void check_case(const Comm& comm, const RunOptions& options);
 
+/// Print the case with every default filled in, as a case file. @throws InputError
+void print_resolved(const Comm& comm, const RunOptions& options);
+
 /// Write the biconcave mesh with exactly this many vertices as OFF or STL. @throws InputError
 void write_mesh(int vertices, const std::string& path);
 

@@ -58,6 +58,8 @@ void log_info(const std::string& message) {
     log_warning("what the program says can no longer be written (stdout): it goes on");
 }
 
+void log_text(const std::string& text) { log_info(!text.empty() && text.back() == '\n' ? text.substr(0, text.size() - 1) : text); }
+
 void log_warning(const std::string& message) {
   auto& log = state();
   if (!log.root) return;

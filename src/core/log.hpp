@@ -14,6 +14,8 @@ namespace corpuscle {
 void open_log(bool root, bool quiet = false);
 
 void log_info(const std::string& message);
+/// Lines that end themselves, such as those of a file.
+void log_text(const std::string& text);
 void log_warning(const std::string& message);
 /// Also heard from ranks other than 0 when `everywhere` is set: for the rank on which something broke.
 void log_error(const std::string& message, bool everywhere = false);

@@ -246,6 +246,7 @@ struct Case {
   std::string path;                     // of the case file
   std::string title;
   std::string resolved;                 // every key with the value used, as TOML; stored with the results
+  std::vector<std::string> without_effect;  // keys among those that mean nothing in this scene
   std::vector<std::string> remarks;     // on keys that are given and have no effect
   TimeSettings time;
   std::optional<GridSettings> grid;

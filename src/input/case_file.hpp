@@ -16,4 +16,7 @@ CaseFile load_case_file(const std::string& path);
 /// As read_case(path), of the file's text.
 Case read_case(const CaseFile& file, const std::vector<std::string>& overrides = {});
 
+/// The case with every key that has a value in it, as a case file that gives the same case and no words on keys without effect.
+std::string resolved_text(const Case& scene);
+
 }  // namespace corpuscle

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "core/error.hpp"
 #include "core/nearest.hpp"
@@ -153,6 +154,7 @@ class CaseReader {
                                      [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::outflow; });
     note(given("time", "stop_before_outflow_um") && !outflow,
          fmt::format("time.stop_before_outflow_um = {:g} has no effect: no side is an \"outflow\"", time.stop_before_outflow_um));
+    if (!outflow) scene.without_effect.push_back("stop_before_outflow_um");
     note(follows_late(scene) && given("time", "first_step_us") && time.first_step_us == 0,
          "time.first_step_us = 0: with membrane viscosity in a fluid that is everywhere the first steps follow a load late, and "
          "what they leave lasts: leave the key out, for short ones, or reduce time.step_us");
@@ -200,6 +202,7 @@ class CaseReader {
     for (const auto& [key, why] : {std::pair{"mass_pg", "membranes have no mass of their own"},
                                    {"volume_modulus_Pa", "the fluid inside keeps each cell's volume as it is"},
                                    {"interior", "the fluid is inside the cells as well (viscosity_ratio)"}}) {
+      scene.without_effect.emplace_back(key);
       std::string first;
       int others = -1;
       for (const char* list : {"cell_types", "cells"}) {
@@ -277,6 +280,17 @@ CaseFile load_case_file(const std::string& path) {
 }
 
 Case read_case(const CaseFile& file, const std::vector<std::string>& overrides) { return CaseReader(file, overrides).read(); }
+
+std::string resolved_text(const Case& scene) {
+  std::string text;
+  std::istringstream lines(scene.resolved);
+  for (std::string line; std::getline(lines, line);) {
+    const auto& idle = scene.without_effect;
+    const bool drop = std::find(idle.begin(), idle.end(), line.substr(0, line.find(" = "))) != idle.end();
+    if (!drop) text += line + "\n";
+  }
+  return text;
+}
 
 Case read_case(const std::string& path, const std::vector<std::string>& overrides) {
   return read_case(load_case_file(path), overrides);

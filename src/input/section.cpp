@@ -80,8 +80,9 @@ const toml::node* Section::node(const std::string& key) {
   return table_ ? table_->get(key) : nullptr;
 }
 
-double Section::number(const std::string& key, const Bounds& allowed, std::optional<double> fallback) {
-  record(key, allowed.text, fallback ? toml_text(*fallback) : "", fallback.has_value());
+double Section::number(const Key& wanted, const Bounds& allowed, std::optional<double> fallback) {
+  const std::string& key = wanted.name;
+  record(wanted, allowed.text, fallback ? toml_text(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, allowed.text), 0;
   const double value = found ? number_in(key, *found, allowed) : *fallback;
@@ -89,9 +90,10 @@ double Section::number(const std::string& key, const Bounds& allowed, std::optio
   return value;
 }
 
-int Section::integer(const std::string& key, int low, int high, std::optional<int> fallback) {
+int Section::integer(const Key& wanted, int low, int high, std::optional<int> fallback) {
+  const std::string& key = wanted.name;
   const auto allowed = fmt::format("a whole number from {} to {}", low, high);
-  record(key, allowed, fallback ? std::to_string(*fallback) : "", fallback.has_value());
+  record(wanted, allowed, fallback ? std::to_string(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, allowed), low;
   if (found && (!found->is_integer() || *found->value<std::int64_t>() < low || *found->value<std::int64_t>() > high))
@@ -101,8 +103,9 @@ int Section::integer(const std::string& key, int low, int high, std::optional<in
   return value;
 }
 
-bool Section::flag(const std::string& key, bool fallback) {
-  record(key, "true or false", fallback ? "true" : "false", true);
+bool Section::flag(const Key& wanted, bool fallback) {
+  const std::string& key = wanted.name;
+  record(wanted, "true or false", fallback ? "true" : "false", true);
   const auto* found = node(key);
   if (found && !found->is_boolean()) fail(key, "must be true or false");
   const bool value = found ? *found->value<bool>() : fallback;
@@ -110,8 +113,9 @@ bool Section::flag(const std::string& key, bool fallback) {
   return value;
 }
 
-std::string Section::text(const std::string& key, std::optional<std::string> fallback) {
-  record(key, "a text in quotes", fallback ? toml_text(*fallback) : "", fallback.has_value());
+std::string Section::text(const Key& wanted, std::optional<std::string> fallback) {
+  const std::string& key = wanted.name;
+  record(wanted, "a text in quotes", fallback ? toml_text(*fallback) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, "a text in quotes"), "";
   if (found && !found->is_string()) fail(key, "must be a text in quotes");
@@ -120,9 +124,10 @@ std::string Section::text(const std::string& key, std::optional<std::string> fal
   return value;
 }
 
-Triple Section::triple(const std::string& key, const Bounds& allowed, std::optional<Triple> fallback) {
+Triple Section::triple(const Key& wanted, const Bounds& allowed, std::optional<Triple> fallback) {
+  const std::string& key = wanted.name;
   const auto description = "three numbers [x, y, z], each " + allowed.text;
-  record(key, description, fallback ? toml_text(fallback->data(), 3) : "", fallback.has_value());
+  record(wanted, description, fallback ? toml_text(fallback->data(), 3) : "", fallback.has_value());
   const auto* found = node(key);
   if (!found && !fallback) return miss(key, description), Triple{};
   Triple value = fallback.value_or(Triple{});
@@ -137,9 +142,10 @@ Triple Section::triple(const std::string& key, const Bounds& allowed, std::optio
   return value;
 }
 
-std::array<int, 3> Section::integers(const std::string& key, int low, int high) {
+std::array<int, 3> Section::integers(const Key& wanted, int low, int high) {
+  const std::string& key = wanted.name;
   const auto allowed = fmt::format("three whole numbers [i, j, k], each from {} to {}", low, high);
-  record(key, allowed, "", false);
+  record(wanted, allowed, "", false);
   const auto* found = node(key);
   if (!found) return miss(key, allowed), std::array<int, 3>{low, low, low};
   const auto* list = found->as_array();
@@ -155,11 +161,12 @@ std::array<int, 3> Section::integers(const std::string& key, int low, int high) 
 }
 
 template <std::size_t N>
-std::vector<std::array<double, N>> Section::rows(const std::string& key, std::size_t min_rows) {
+std::vector<std::array<double, N>> Section::rows(const Key& wanted, std::size_t min_rows) {
+  const std::string& key = wanted.name;
   const auto allowed = fmt::format("a list of {} or more rows of {} numbers, such as [[{}], ...]", min_rows, N,
                                    N == 2 ? "0, 1" : "0, 0, 1");
   std::vector<std::array<double, N>> values;
-  record(key, allowed, "", true);
+  record(wanted, allowed, "", true);
   const auto* found = node(key);
   if (!found) return values;
   const auto* list = found->as_array();
@@ -173,12 +180,13 @@ std::vector<std::array<double, N>> Section::rows(const std::string& key, std::si
   echo_line(key, "[" + text + "]");
   return values;
 }
-template std::vector<std::array<double, 2>> Section::rows<2>(const std::string&, std::size_t);
-template std::vector<std::array<double, 3>> Section::rows<3>(const std::string&, std::size_t);
+template std::vector<std::array<double, 2>> Section::rows<2>(const Key&, std::size_t);
+template std::vector<std::array<double, 3>> Section::rows<3>(const Key&, std::size_t);
 
-std::string Section::file(const std::string& key, bool required) {
+std::string Section::file(const Key& wanted, bool required) {
+  const std::string& key = wanted.name;
   if (recorder_) {
-    record(key, "the path of a file, in quotes", "", !required);
+    record(wanted, "the path of a file, in quotes", "", !required);
     know(key);
     if (!required) recorder_->choices[key] = {"none", "a file"};
     const bool given = required || (recorder_->chosen.count(key) && recorder_->chosen[key] == 1);
@@ -205,19 +213,19 @@ void Section::unused(const std::string& key, const std::string& why) {
   if (node(key)) fail(key, why);
 }
 
-void Section::require(const std::string& key, const std::string& allowed) {
+void Section::require(const Key& key, const std::string& allowed) {
   record(key, allowed, "", false);
-  if (!has(key)) miss(key, allowed);
+  if (!has(key.name)) miss(key.name, allowed);
 }
 
-void Section::record(const std::string& key, const std::string& allowed, const std::string& value, bool optional) {
+void Section::record(const Key& key, const std::string& allowed, const std::string& value, bool optional) {
   if (!recorder_) return;
   for (auto& known : recorder_->keys)
-    if (known.key == key) {
+    if (known.key == key.name) {
       if (!optional) known.allowed = allowed, known.optional = false;  // required after all
       return;
     }
-  recorder_->keys.push_back({key, allowed, value, optional, ""});
+  recorder_->keys.push_back({key.name, key.what, allowed, value, optional, ""});
 }
 
 void Section::finish() {
@@ -259,10 +267,11 @@ void Section::fail(const std::string& key, const std::string& problem) const {
   throw InputError(fmt::format("{}: {}{}{}{}", where(key), name, value, name.empty() ? "" : ": ", problem));
 }
 
-std::size_t Section::word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback) {
+std::size_t Section::word(const Key& wanted, const std::vector<std::string>& names, std::size_t fallback) {
+  const std::string& key = wanted.name;
   const auto allowed = fmt::format("one of \"{}\"", fmt::join(names, "\", \""));
   if (recorder_) {
-    record(key, allowed, fallback < names.size() ? toml_text(names[fallback]) : "", fallback < names.size());
+    record(wanted, allowed, fallback < names.size() ? toml_text(names[fallback]) : "", fallback < names.size());
     know(key);
     recorder_->choices[key] = names;
     const auto chosen = recorder_->chosen.find(key);

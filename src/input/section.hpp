@@ -34,6 +34,11 @@ Bounds positive(double high = 1e300);
 Bounds not_negative(double high = 1e300);
 Bounds between(double low, double high);
 
+/// A key and, in one sentence, what it says.
+struct Key {
+  std::string name, what;
+};
+
 /// What a reader asks of a section, gathered while it reads an empty one.
 struct KeyRecorder {
   std::map<std::string, std::size_t> chosen;                 // which word the reader is to find for each choice
@@ -55,27 +60,27 @@ class Section {
   bool recording() const { return recorder_ != nullptr; }
   /// Of a key that is read by other means than those below.
   /// @param value  default as TOML; "" for a key that may be left out
-  void describe(const std::string& key, const std::string& allowed, const std::string& value) { record(key, allowed, value, true); }
+  void describe(const Key& key, const std::string& allowed, const std::string& value) { record(key, allowed, value, true); }
 
   bool has(const std::string& key) const { return table_ && table_->contains(key); }
   const toml::node* node(const std::string& key);
 
   /// A value in range, or `fallback`; without a fallback the key is required (reported by finish()).
-  double number(const std::string& key, const Bounds& allowed, std::optional<double> fallback = {});
-  int integer(const std::string& key, int low, int high, std::optional<int> fallback = {});
-  bool flag(const std::string& key, bool fallback);
-  std::string text(const std::string& key, std::optional<std::string> fallback = {});
-  Triple triple(const std::string& key, const Bounds& allowed, std::optional<Triple> fallback = {});
-  std::array<int, 3> integers(const std::string& key, int low, int high);
+  double number(const Key& key, const Bounds& allowed, std::optional<double> fallback = {});
+  int integer(const Key& key, int low, int high, std::optional<int> fallback = {});
+  bool flag(const Key& key, bool fallback);
+  std::string text(const Key& key, std::optional<std::string> fallback = {});
+  Triple triple(const Key& key, const Bounds& allowed, std::optional<Triple> fallback = {});
+  std::array<int, 3> integers(const Key& key, int low, int high);
   /// Rows of N numbers, at least `min_rows` of them; absent: empty.
   template <std::size_t N>
-  std::vector<std::array<double, N>> rows(const std::string& key, std::size_t min_rows);
+  std::vector<std::array<double, N>> rows(const Key& key, std::size_t min_rows);
   /// Path of an existing file, made absolute; relative paths start at the case file's folder. Absent: "".
-  std::string file(const std::string& key, bool required);
+  std::string file(const Key& key, bool required);
 
   /// One of several words. Without a fallback a missing key is reported at once, since it decides which others exist.
   template <class E>
-  E choice(const std::string& key, const std::vector<std::pair<std::string, E>>& words,
+  E choice(const Key& key, const std::vector<std::pair<std::string, E>>& words,
            std::optional<E> fallback = {}) {
     std::vector<std::string> names;
     for (const auto& [name, value] : words) names.push_back(name);
@@ -88,7 +93,7 @@ class Section {
   /// The key has no meaning here: an error if it is present.
   void unused(const std::string& key, const std::string& why);
   /// Required after all, as found from other values.
-  void require(const std::string& key, const std::string& allowed);
+  void require(const Key& key, const std::string& allowed);
   /// Unknown keys first (they explain missing ones), then missing keys.
   void finish();
 
@@ -106,8 +111,8 @@ class Section {
   std::vector<std::string> present() const;
 
  private:
-  void record(const std::string& key, const std::string& allowed, const std::string& value, bool optional);
-  std::size_t word(const std::string& key, const std::vector<std::string>& names, std::size_t fallback);
+  void record(const Key& key, const std::string& allowed, const std::string& value, bool optional);
+  std::size_t word(const Key& key, const std::vector<std::string>& names, std::size_t fallback);
   double number_in(const std::string& key, const toml::node& node, const Bounds& allowed) const;
   std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count,
                                  const std::string& allowed) const;

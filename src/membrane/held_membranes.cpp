@@ -204,14 +204,14 @@ void Membranes::forget_geometry() {
 
 void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   SurfaceSet& set = views_.surface;
-  std::vector<int> type, number, first_vertex{0}, first_triangle{0}, type_of_own;
+  std::vector<int> type, number, first_vertex{0}, first_triangle{0};
   for (const HeldCell& cell : cells) {
     type.push_back(cell.type);
     number.push_back(cell.number);
     first_vertex.push_back(first_vertex.back() + int(types_[cell.type].mesh.vertices.size()));
     first_triangle.push_back(first_triangle.back() + int(types_[cell.type].mesh.triangles.size()));
   }
-  type_of_own.assign(type.begin(), type.begin() + own);
+  type_of_own_.assign(type.begin(), type.begin() + own);
   set.bodies = set.cells = int(cells.size());
   set.own_cells = own;
   set.vertices = first_vertex.back();
@@ -231,7 +231,7 @@ void Membranes::hold(const std::vector<HeldCell>& cells, int own) {
   if (viscosity_) viscosity_->hold(views_, parts_);
   describe_cells(cells, own);
   stiffness_.clear();
-  elasticity_ = make_elasticity(types_, type_of_own);
+  elasticity_ = make_law_(types_, type_of_own_);
 }
 
 }  // namespace corpuscle

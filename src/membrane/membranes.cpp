@@ -67,7 +67,8 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   describe_cells(held, int(held.size()));
   bodies.insert(bodies.end(), rigid_bodies.begin(), rigid_bodies.end());
   views_ = make_membrane_views(make_surface_set(bodies, int(cells.size())), types_, types.of_cell);
-  elasticity_ = make_elasticity(types_, types.of_cell);
+  type_of_own_ = types.of_cell;
+  elasticity_ = make_law_(types_, type_of_own_);
   motion_ = make_motion_views(views_);
   const auto label = [](const char* name) { return uninitialised(std::string("corpuscle::membrane::") + name); };
   status_host_ = HostCopy(views_.status);
@@ -75,6 +76,12 @@ Membranes::Membranes(const std::vector<CellSettings>& cells, const std::vector<T
   start_v_ = Components<double>(label("start_v_vertex"), views_.vertices, 3);
   make_viscosity();
   if (viscosity_) viscosity_->make_room(views_);
+}
+
+void Membranes::take_law(ElasticityMaker make) {
+  make_law_ = std::move(make);
+  elasticity_ = make_law_(types_, type_of_own_);
+  forget_stiffness();
 }
 
 void Membranes::make_viscosity() {

@@ -1,6 +1,7 @@
 // All cells' membranes: forces, motion, diagnostics, state.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "core/workspace.hpp"
 #include "immersed/surface.hpp"
 #include "membrane/elasticity.hpp"
+#include "membrane/membrane_setup.hpp"
 #include "membrane/membrane_views.hpp"
 #include "membrane/mobility.hpp"
 #include "membrane/motion.hpp"
@@ -46,6 +48,9 @@ CellTypes find_cell_types(const std::vector<CellSettings>& cells);
 
 class MembraneViscosity;
 
+/// Makes the elasticity of a rank's cells, of the types and the type of each; see ElasticityOf for one of a law of one's own.
+using ElasticityMaker = std::function<std::unique_ptr<Elasticity>(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell)>;
+
 class Membranes {
  public:
   /// Build the cells' meshes and references, and one surface set that holds the cells first and then `rigid_bodies`.
@@ -75,6 +80,10 @@ class Membranes {
   const SurfaceSet& surfaces() const { return views_.surface; }
   const MembraneViews& views() const { return views_; }
   const Elasticity& elasticity() const { return *elasticity_; }
+  /// From now on the cells' in-plane law is what `make` makes of it, in place of those that a case can name. Called at once, and
+  /// whenever cells come or go. What was estimated of stiffness before is forgotten; what set-up took from it, such as the longest stable
+  /// step of membranes that are forces, is of the case's own law.
+  void take_law(ElasticityMaker make);
   /// In the plane of a cell's membrane.
   const MembraneLaw& law(int cell) const { return law_[cell]; }
   /// Of a cell in the whole scene.
@@ -230,6 +239,8 @@ class Membranes {
   [[noreturn]] void explain_volume(int cell, double drift) const;
 
   MembraneViews views_;
+  ElasticityMaker make_law_ = make_elasticity;
+  std::vector<int> type_of_own_;
   std::unique_ptr<Elasticity> elasticity_;
   MotionViews motion_;
   HostCopy<Array<int>> status_host_;

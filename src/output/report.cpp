@@ -13,8 +13,6 @@
 
 namespace corpuscle {
 
-extern const char source_hash[];  // written by git_hash.cmake
-
 namespace {
 
 nlohmann::json to_json(const Tally& tally) {
@@ -36,13 +34,6 @@ std::vector<std::string> outputs_left_out(const OutputSettings& output) {
 #endif
   return lines;
 }
-
-std::string git_hash() {
-  const std::string hash = source_hash;
-  return hash.empty() ? "unknown" : hash;
-}
-
-std::string backend_name() { return Exec::name(); }
 
 int thread_count() { return Kokkos::DefaultHostExecutionSpace().concurrency(); }
 
@@ -67,9 +58,11 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["case"] = report.case_path;
   json["title"] = report.title;
   json["resolved_case"] = report.resolved;
+  json["version"] = version_number();
   json["git"] = git_hash();
   json["backend"] = backend_name();
   json["kokkos"] = kokkos_configuration();
+  for (const auto& [name, version] : libraries()) json["libraries"][name] = version;
   json["ranks"] = report.ranks > 0 ? report.ranks : comm.size();
   if (!report.stopped.empty()) json["stopped"] = report.stopped;
   if (!report.broke_down.empty()) json["broke_down"] = report.broke_down;

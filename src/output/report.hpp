@@ -8,6 +8,7 @@
 
 #include "common/extremes.hpp"
 #include "input/case.hpp"
+#include "output/version.hpp"
 #include "parallel/comm.hpp"
 
 namespace corpuscle {
@@ -54,10 +55,6 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
 /// Outputs that the case asks for and this build cannot write, one line each with the reason; empty with HDF5.
 std::vector<std::string> outputs_left_out(const OutputSettings& output);
 
-/// Hash of the source this program was built from, "unknown" outside a checkout.
-std::string git_hash();
-/// Name of the Kokkos execution space that kernels run in, such as "OpenMP".
-std::string backend_name();
 /// Threads of the host execution space on this rank.
 int thread_count();
 /// Kokkos version and settings, as Kokkos prints them.

@@ -275,7 +275,8 @@ TEST_CASE("the mesh of a cell, the version, and a command line that says nothing
   REQUIRE(magic == "OFF");
   REQUIRE(vertices == 500);
   REQUIRE(triangles == 996);  // a closed surface without handles: 2 n - 4
-  REQUIRE_THAT(succeed(folder, {"--version"}).output, Contains("corpuscle "));
+  REQUIRE_THAT(succeed(folder, {"--version"}).output,
+               Contains("corpuscle 0.") && Contains("git ") && Contains("Kokkos ") && Contains("hypre ") && Contains("MPI ") && Contains("HDF5 "));
   REQUIRE_THAT(succeed(folder, {"--help"}).output, Contains("run") && Contains("check") && Contains("mesh"));
   fail(folder, {}, 2, {"subcommand"});
   fail(folder, {"run", scene("couette"), "--bogus"}, 2, {"--bogus"});

@@ -6,7 +6,7 @@
 
 #include "core/error.hpp"
 #include "core/units.hpp"
-#include "input/case.hpp"
+#include "input/case_file.hpp"
 #include "input/case_changes.hpp"
 
 using namespace corpuscle;
@@ -55,6 +55,10 @@ TEST_CASE("every case file reads, and its echo reads back to the same case") {
     const auto again = read_echo(scene);
     require_same(scene, again);
     REQUIRE(again.resolved == scene.resolved);
+    std::ofstream(fs::temp_directory_path() / "corpuscle_test_resolved.toml") << resolved_text(scene);
+    const auto resolved = read_case((fs::temp_directory_path() / "corpuscle_test_resolved.toml").string());
+    require_same(scene, resolved);
+    CHECK(resolved.remarks == scene.remarks);  // nothing that it says besides is warned of
   }
   REQUIRE(found >= 6);
 }

@@ -1,7 +1,10 @@
 // The list of keys is what the readers ask for.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cctype>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "core/error.hpp"
@@ -44,6 +47,34 @@ TEST_CASE("every key that a case is echoed with is listed") {
   CHECK(looked > 100);
 }
 
+TEST_CASE("every key says what it is for in one sentence") {
+  for (const auto& section : list_keys())
+    for (const auto& key : section.keys) {
+      INFO(section.name << "." << key.key << ": " << key.what);
+      REQUIRE(key.what.size() > 10);
+      CHECK(key.what.back() == '.');
+      CHECK(key.what.find(". ") == std::string::npos);
+      CHECK((std::isupper(static_cast<unsigned char>(key.what[0])) != 0));
+    }
+}
+
+TEST_CASE("the unit of a key is in its name") {
+  CHECK(unit_of("kinematic_viscosity_um2_per_us") == "um2/us");
+  CHECK(unit_of("robin_coefficient_pg_per_um2_per_us") == "pg/(um2 us)");
+  CHECK(unit_of("membrane_viscosity_N_s_per_m") == "N s/m");
+  CHECK(unit_of("bending_modulus_J") == "J");
+  CHECK(unit_of("end_us") == "us");
+  CHECK(unit_of("pressure_gradient_Pa_per_um") == "Pa/um");
+  for (const char* key : {"nodes", "um", "axis", "scheme", "bonus"}) CHECK(unit_of(key).empty());
+}
+
+TEST_CASE("the page of keys is what the program prints") {
+  std::ifstream file(CORPUSCLE_SOURCE_DIR "/docs/keys.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  INFO("build/openmp/corpuscle keys --markdown > docs/keys.md makes it anew");
+  CHECK(page == keys_markdown());
+}
+
 TEST_CASE("keys are listed with default, range and where they belong") {
   CHECK(find("time", "step_us")->value.empty());
   CHECK_FALSE(find("time", "step_us")->optional);
@@ -63,7 +94,7 @@ TEST_CASE("keys are listed with default, range and where they belong") {
   for (const auto& [section, key] : {std::pair{"fluid", "convection"}, {"output", "fields"}, {"boundary", "velocity_mm_per_s"},
                                      {"coupling", "robin_coefficient_pg_per_um2_per_us"}, {"stretching", "experiment"}, {"blood", "from_us"}, {"blood", "bins"}, {"output", "cells_in_history"}, {"bodies", "semi_axes_um"}})
     CHECK(find(section, key));
-  CHECK_THAT(keys_text("grid"), Contains("[grid]") && Contains("length_um: a number above 0") && !Contains("[fluid]"));
+  CHECK_THAT(keys_text("grid"), Contains("[grid]") && Contains("length_um: Length of the tube") && Contains("a number above 0") && !Contains("[fluid]"));
   CHECK_THAT(keys_text(""), Contains("[[cells]]") && Contains("title"));
   CHECK_THROWS_WITH(keys_text("gird"), Contains("did you mean 'grid'?"));
 }
