@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <exception>
 
+#include "core/error.hpp"
 #include "coupling/flow_simulation.hpp"
 #include "input/case_file.hpp"
 #include "membrane/membranes.hpp"
