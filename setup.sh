@@ -28,7 +28,7 @@ trap 'fail "stopped at line $LINENO; the output above says why. Running ./setup.
 
 packages=(build-essential cmake ninja-build pkg-config git ca-certificates dpkg-dev
   libopenmpi-dev openmpi-bin libhdf5-openmpi-dev catch2 libtomlplusplus-dev libcli11-dev libfmt-dev
-  libspdlog-dev nlohmann-json3-dev libqhull-dev liblapack-dev python3 python3-h5py python3-matplotlib)
+  libspdlog-dev nlohmann-json3-dev libqhull-dev liblapack-dev clang-format python3 python3-h5py python3-matplotlib)
 
 as_root() {
   if [ "$(id -u)" = 0 ]; then "$@"

@@ -8,8 +8,8 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
-#include <numeric>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -110,7 +110,8 @@ const std::map<std::string, Definition> definitions = {
 double cells_of(const FluidSolver& fluid, Where where) {
   auto cells = fluid.multigrid_cells();
   const std::size_t all = cells.size();
-  while (cells.size() > 1 && all - cells.size() < SmallLevels<Array<CycleReal>>::most && cells.back() <= SmallLevels<Array<CycleReal>>::most_cells)
+  while (cells.size() > 1 && all - cells.size() < SmallLevels<Array<CycleReal>>::most &&
+         cells.back() <= SmallLevels<Array<CycleReal>>::most_cells)
     cells.pop_back();
   std::size_t levels = 1;
   if (where == Where::pressure) levels = cells.size() < all ? cells.size() : all - 1;

@@ -50,19 +50,21 @@ void vectors(int entries, int repeats) {
   Kokkos::deep_copy(b, 0.5);
   volatile double kept = 0;
   const std::string size = std::to_string(entries) + " entries";
-  compare("dot, " + size, repeats, [&] { kept = KokkosBlas::dot(a, b); },
-          [&] {
-            double sum = 0;
-            Kokkos::parallel_reduce(
-                "corpuscle::perf::dot", Policy(0, entries), KOKKOS_LAMBDA(int i, double& s) { s += a(i) * b(i); }, sum);
-            kept = sum;
-          });
+  compare(
+      "dot, " + size, repeats, [&] { kept = KokkosBlas::dot(a, b); },
+      [&] {
+        double sum = 0;
+        Kokkos::parallel_reduce(
+            "corpuscle::perf::dot", Policy(0, entries), KOKKOS_LAMBDA(int i, double& s) { s += a(i) * b(i); }, sum);
+        kept = sum;
+      });
   const Array<double> c("corpuscle::perf::c", entries);
-  compare("extrapolation of a scalar in time, " + size, repeats, [&] { KokkosBlas::update(1.25, a, -0.25, b, 0.0, c); },
-          [&] { extrapolate(0.25, a, b, c); });
+  compare(
+      "extrapolation of a scalar in time, " + size, repeats, [&] { KokkosBlas::update(1.25, a, -0.25, b, 0.0, c); },
+      [&] { extrapolate(0.25, a, b, c); });
   const Components<double> u("corpuscle::perf::u", entries, 3), v("corpuscle::perf::v", entries, 3), w("corpuscle::perf::w", entries, 3);
-  compare("the same of a velocity", repeats, [&] { KokkosBlas::update(1.25, u, -0.25, v, 0.0, w); },
-          [&] { extrapolate(0.25, u, v, w); });
+  compare(
+      "the same of a velocity", repeats, [&] { KokkosBlas::update(1.25, u, -0.25, v, 0.0, w); }, [&] { extrapolate(0.25, u, v, w); });
   static_cast<void>(kept);
 }
 
@@ -78,34 +80,35 @@ void fits(int systems, int repeats) {
         for (int r = 0; r < N; ++r)
           for (int c = 0; c < N; ++c) given(s, r, c) = 1.0 / (1 + r + c) + (r == c ? 1 : 0);
       });
-  compare("factorise and solve " + std::to_string(N) + " unknowns, " + std::to_string(systems) + " systems", repeats,
-          [&] {
-            Kokkos::parallel_for(
-                "corpuscle::perf::batched", Policy(0, systems), KOKKOS_LAMBDA(int s) {
-                  auto a = Kokkos::subview(matrix, s, Kokkos::ALL(), Kokkos::ALL());
-                  auto b = Kokkos::subview(rhs, s, Kokkos::ALL());
-                  for (int r = 0; r < N; ++r) {
-                    b(r) = 1;
-                    for (int c = 0; c < N; ++c) a(r, c) = given(s, r, c);
-                  }
-                  KokkosBatched::SerialLU<KokkosBatched::Algo::LU::Unblocked>::invoke(a);
-                  KokkosBatched::SerialSolveLU<KokkosBatched::Trans::NoTranspose, KokkosBatched::Algo::SolveLU::Unblocked>::invoke(a, b);
-                });
-          },
-          [&] {
-            Kokkos::parallel_for(
-                "corpuscle::perf::own_fit", Policy(0, systems), KOKKOS_LAMBDA(int s) {
-                  NormalMatrix<N> normal;
-                  double b[N];
-                  for (int r = 0; r < N; ++r) {
-                    b[r] = 1;
-                    for (int c = 0; c <= r; ++c) normal.a[NormalMatrix<N>::at(r, c)] = given(s, r, c);
-                  }
-                  normal.factorise(1e-12);
-                  normal.solve(b);
-                  for (int r = 0; r < N; ++r) rhs(s, r) = b[r];
-                });
-          });
+  compare(
+      "factorise and solve " + std::to_string(N) + " unknowns, " + std::to_string(systems) + " systems", repeats,
+      [&] {
+        Kokkos::parallel_for(
+            "corpuscle::perf::batched", Policy(0, systems), KOKKOS_LAMBDA(int s) {
+              auto a = Kokkos::subview(matrix, s, Kokkos::ALL(), Kokkos::ALL());
+              auto b = Kokkos::subview(rhs, s, Kokkos::ALL());
+              for (int r = 0; r < N; ++r) {
+                b(r) = 1;
+                for (int c = 0; c < N; ++c) a(r, c) = given(s, r, c);
+              }
+              KokkosBatched::SerialLU<KokkosBatched::Algo::LU::Unblocked>::invoke(a);
+              KokkosBatched::SerialSolveLU<KokkosBatched::Trans::NoTranspose, KokkosBatched::Algo::SolveLU::Unblocked>::invoke(a, b);
+            });
+      },
+      [&] {
+        Kokkos::parallel_for(
+            "corpuscle::perf::own_fit", Policy(0, systems), KOKKOS_LAMBDA(int s) {
+              NormalMatrix<N> normal;
+              double b[N];
+              for (int r = 0; r < N; ++r) {
+                b[r] = 1;
+                for (int c = 0; c <= r; ++c) normal.a[NormalMatrix<N>::at(r, c)] = given(s, r, c);
+              }
+              normal.factorise(1e-12);
+              normal.solve(b);
+              for (int r = 0; r < N; ++r) rhs(s, r) = b[r];
+            });
+      });
 }
 
 /// The product with a pressure matrix of a skewed grid, 19 entries a row, beside hypre's.
@@ -136,14 +139,14 @@ void product(int cells, int repeats) {
       }
   using Matrix = KokkosSparse::CrsMatrix<double, int, Kokkos::Device<Exec, Exec::memory_space>, void, int>;
   std::vector<double> values(columns.size(), 1.0);
-  const Matrix matrix("corpuscle::perf::csr", rows, rows, static_cast<int>(columns.size()), values.data(), row_map.data(),
-                      columns.data());
+  const Matrix matrix("corpuscle::perf::csr", rows, rows, static_cast<int>(columns.size()), values.data(), row_map.data(), columns.data());
   const Array<double> x("corpuscle::perf::x", rows), y("corpuscle::perf::y", rows);
   Kokkos::deep_copy(x, 1.0);
   system.load(x, y);
-  compare("product, " + std::to_string(rows) + " rows of up to " + std::to_string(count) + " (own: hypre's)", repeats,
-          [&] { KokkosSparse::spmv("N", 1.0, matrix, x, 0.0, y); },
-          [&] { HYPRE_ParCSRMatrixMatvec(1.0, system.matrix(), system.rhs(), 0.0, system.x()); });
+  compare(
+      "product, " + std::to_string(rows) + " rows of up to " + std::to_string(count) + " (own: hypre's)", repeats,
+      [&] { KokkosSparse::spmv("N", 1.0, matrix, x, 0.0, y); },
+      [&] { HYPRE_ParCSRMatrixMatvec(1.0, system.matrix(), system.rhs(), 0.0, system.x()); });
 }
 
 }  // namespace

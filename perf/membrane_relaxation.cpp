@@ -39,8 +39,8 @@ void relax(char** argv) {
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const auto d = membranes.diagnostics().front();
   const auto extent = d.extent_um();
-  std::printf("{\"extent_um\": [%.9g, %.9g, %.9g], \"elastic_energy_fJ\": %.9g, \"wall_s\": %.4f}\n", extent[0], extent[1],
-              extent[2], d.energy_fJ(), wall);
+  std::printf("{\"extent_um\": [%.9g, %.9g, %.9g], \"elastic_energy_fJ\": %.9g, \"wall_s\": %.4f}\n", extent[0], extent[1], extent[2],
+              d.energy_fJ(), wall);
 }
 
 }  // namespace

@@ -37,10 +37,10 @@ std::vector<BoundarySettings> all_sides(Type type) {
 }
 
 NodeSource box(const std::array<int, 3>& cells, double length) {
-  return {cells, [=](int i, int j, int k) {
-            return Triple{length * (i / double(cells[0]) - 0.5), length * (j / double(cells[1]) - 0.5),
-                          length * (k / double(cells[2]) - 0.5)};
-          }};
+  return {
+      cells, [=](int i, int j, int k) {
+        return Triple{length * (i / double(cells[0]) - 0.5), length * (j / double(cells[1]) - 0.5), length * (k / double(cells[2]) - 0.5)};
+      }};
 }
 
 void rest(char** words) {
@@ -55,8 +55,7 @@ void rest(char** words) {
     tube.nodes = {n + 1, n + 1, n + 1};
     nodes = make_node_source(tube);
   }
-  HeldSurface held(nodes, all_sides(Type::wall), stokes(), ellipsoid_mesh(axes, {0.03, -0.02, 0.01}, 0.4 * h),
-                   kernel_of(words[0]));
+  HeldSurface held(nodes, all_sides(Type::wall), stokes(), ellipsoid_mesh(axes, {0.03, -0.02, 0.01}, 0.4 * h), kernel_of(words[0]));
   held.set_force([](const Vec3&, const Vec3& area) { return area; });
   held.settle(6, 40 * h * h);
   double most = 0, inside = 0, outside = 0;
@@ -68,8 +67,8 @@ void rest(char** words) {
     if (distance < -2 * h) inside += p, ++within;
     if (distance > 2 * h) outside += p, ++without;
   });
-  std::printf("{\"vertices\": %d, \"speed_at_vertices\": %.3e, \"speed_in_cells\": %.3e, \"jump\": %.5f}\n",
-              held.surface.vertices, held.largest_vertex_speed(), most, outside / without - inside / within);
+  std::printf("{\"vertices\": %d, \"speed_at_vertices\": %.3e, \"speed_in_cells\": %.3e, \"jump\": %.5f}\n", held.surface.vertices,
+              held.largest_vertex_speed(), most, outside / without - inside / within);
 }
 
 /// The radius that makes Hasimoto's speed of a uniform force over a sphere the one found.
@@ -102,8 +101,7 @@ void sphere(char** words) {
     for (int slip = 0; slip < 2; ++slip) {
       if (slip) held.take_velocity(true);
       const double found = dot(held.mean_velocity(), direction);
-      const double radius = 1 / (6 * pi * found / total + 2.837297 / length - 4 * pi / 3 / std::pow(length, 3)),
-                   error = (radius - 1) / h;
+      const double radius = 1 / (6 * pi * found / total + 2.837297 / length - 4 * pi / 3 / std::pow(length, 3)), error = (radius - 1) / h;
       speed[slip] += error / places;
       least[slip] = std::min(least[slip], error), most[slip] = std::max(most[slip], error);
     }

@@ -25,8 +25,8 @@ struct CellFlowColumn {
 using CellFlowSums = Sums<CellFlowColumn::within + most_bins>;
 
 /// A triangle's share: its four quarters, each by the middles of its sides, which is exact for quadratic integrands.
-KOKKOS_INLINE_FUNCTION void add_cell_flow(const FlowFrame& frame, int bins, const Vec3 (&x)[3], const Vec3 (&v)[3],
-                                          const Vec3& origin, CellFlowSums& sum) {
+KOKKOS_INLINE_FUNCTION void add_cell_flow(const FlowFrame& frame, int bins, const Vec3 (&x)[3], const Vec3 (&v)[3], const Vec3& origin,
+                                          CellFlowSums& sum) {
   using Column = CellFlowColumn;
   const Vec3 area = area_vector(x[0], x[1], x[2]);
   sum[Column::volume] += dot(x[0] - origin, area) / 3;
@@ -52,8 +52,8 @@ KOKKOS_INLINE_FUNCTION void add_cell_flow(const FlowFrame& frame, int bins, cons
 
 /// Sums over the first `cells` cells. @param parts  [cells * sections, columns]; @param totals  [columns], columns = 2
 /// + bins
-inline void sum_cell_flow(const SurfaceSet& set, int cells, const FlowFrame& frame, int bins,
-                          const Table<double>& parts, const Array<double>& totals) {
+inline void sum_cell_flow(const SurfaceSet& set, int cells, const FlowFrame& frame, int bins, const Table<double>& parts,
+                          const Array<double>& totals) {
   const auto x = set.x, v = set.v;
   const SurfaceSet s = set;
   const auto first_triangle = set.first_triangle, first_vertex = set.first_vertex;

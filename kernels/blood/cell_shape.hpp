@@ -17,8 +17,8 @@ struct ShapeColumn {
     deformation = 0,     // Taylor's: (L - B) / (L + B) of the ellipsoid of equal inertia, its longest and shortest axes
     inclination = 1,     // of the long axis that it has in the plane, -45 to 135; not a number where that is round
     membrane_angle = 2,  // to which the membrane has carried the cell's own axis, -135 to 225
-    phase = 3,  // from the long axis to there, -45 to 135: constant as the cell tumbles; goes round twice as the
-                // membrane does once
+    phase = 3,           // from the long axis to there, -45 to 135: constant as the cell tumbles; goes round twice as the
+                         // membrane does once
     count = 4
   };
 };
@@ -87,15 +87,14 @@ KOKKOS_INLINE_FUNCTION double axis_angle_deg(const Vec3 (&rotation)[3], const Ve
 }
 
 /// The rows of the first `cells` cells. @param table  [cells, ShapeColumn::count]; angles only where the flow is guided
-inline void measure_shapes(const SurfaceSet& set, int cells, const Array<int>& type, const MaterialViews& material,
-                           const FlowFrame& frame, const Table<double>& table) {
+inline void measure_shapes(const SurfaceSet& set, int cells, const Array<int>& type, const MaterialViews& material, const FlowFrame& frame,
+                           const Table<double>& table) {
   using Column = ShapeColumn;
   const auto x = set.x, reference = material.place;
   const SurfaceSet s = set;
   const auto first_vertex = set.first_vertex, first_triangle = set.first_triangle, first_of_type = material.first;
   Kokkos::parallel_for(
-      "corpuscle::blood::measure_shapes", Kokkos::TeamPolicy<Exec>(cells, Kokkos::AUTO),
-      KOKKOS_LAMBDA(const SectionTeam& team) {
+      "corpuscle::blood::measure_shapes", Kokkos::TeamPolicy<Exec>(cells, Kokkos::AUTO), KOKKOS_LAMBDA(const SectionTeam& team) {
         const int cell = team.league_rank(), first = first_vertex(cell), shift = first_of_type(type(cell)) - first;
         const Vec3 origin = load(x, first);
         Sums<10> moments;

@@ -34,8 +34,7 @@ KOKKOS_INLINE_FUNCTION void reach_out(const FlowFrame& frame, const FlowPlace& p
 /// is none. Of tubes from the centreline; between walls the height, and minus the lowest height. A triangle's extremes
 /// in a window are its corners and where its sides pass into another window. A largest is the same in any order. Then
 /// the largest and minus the smallest share of the window at which there is a membrane.
-inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame& frame, int windows,
-                           const Table<double>& edge) {
+inline void find_core_edge(const SurfaceSet& set, int triangles, const FlowFrame& frame, int windows, const Table<double>& edge) {
   Kokkos::deep_copy(Exec(), edge, nobody);
   const auto x = set.x;
   const SurfaceSet s = set;

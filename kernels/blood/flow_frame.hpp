@@ -12,8 +12,7 @@ struct FlowPlace {
   Vec3 outward;                    // unit vector in which `across` grows; zero on a centreline
   Vec3 tangent, normal, binormal;  // of the flow; across it
   Vec3 offset;                     // tubes: from the centreline
-  double bend =
-      0;  // tubes: curvature . offset; a piece of the tube is (1 - bend) times as long there as on the centreline
+  double bend = 0;                 // tubes: curvature . offset; a piece of the tube is (1 - bend) times as long there as on the centreline
 };
 
 /// Columns of the table of a centreline's stations.
@@ -32,8 +31,8 @@ struct FlowFrame {
   double length = 0;               // of the tube, or of the box along station_axis, um
   bool periodic = false;           // along it
   Vec3 period;                     // of a swept tube
-  Table<double> line;            // [station, LineColumn::count] swept tube: evenly spaced from its beginning to its end
-  int stations = 0, stride = 1;  // stride: of the coarse search, at most half a radius
+  Table<double> line;              // [station, LineColumn::count] swept tube: evenly spaced from its beginning to its end
+  int stations = 0, stride = 1;    // stride: of the coarse search, at most half a radius
   double spacing = 0;
 
   KOKKOS_INLINE_FUNCTION bool tube() const { return kind == Kind::straight || kind == Kind::swept; }

@@ -27,8 +27,7 @@ struct ProfileColumn {
 };
 
 /// Of each owned cell, in compact order, its bin and where it is across, um. In an open flow all are in the first bin.
-inline void find_bins(const GridViews& grid, const FlowFrame& frame, int bins, const Array<int>& bin,
-                      const Array<double>& across) {
+inline void find_bins(const GridViews& grid, const FlowFrame& frame, int bins, const Array<int>& bin, const Array<double>& across) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   for_owned(
@@ -56,8 +55,8 @@ inline void find_directions(const GridViews& grid, const FlowFrame& frame, const
 }
 
 /// @param parts  [bins * sections, ProfileColumn::count]
-inline void sum_profile(const GridViews& grid, const ProfileViews& profile, const Vec3& tangent,
-                        const Components<double>& u, int bins, const Table<double>& parts) {
+inline void sum_profile(const GridViews& grid, const ProfileViews& profile, const Vec3& tangent, const Components<double>& u, int bins,
+                        const Table<double>& parts) {
   using Column = ProfileColumn;
   const auto volume = grid.volume, lengthening = profile.lengthening;
   const auto cell = profile.cell, start = profile.start;

@@ -14,19 +14,17 @@ namespace corpuscle {
 /// along straight walls this one is exact, since it is what the flow has been solved with.
 /// @param face  its number, that of the cell above it; end: 0 or 1, whether the wall is at the low or the high end of d
 template <bool skewed>
-KOKKOS_INLINE_FUNCTION Vec3 wall_face_force(const ViscousCoefficients& g, const IndexSpace& index,
-                                            const Components<double>& u, const Vec3& area, double viscosity, int d,
-                                            int end, int face) {
+KOKKOS_INLINE_FUNCTION Vec3 wall_face_force(const ViscousCoefficients& g, const IndexSpace& index, const Components<double>& u,
+                                            const Vec3& area, double viscosity, int d, int end, int face) {
   Vec3 force;
-  for (int m = 0; m < 3; ++m)
-    force[m] = (end == 0 ? viscosity : -viscosity) * viscous_face<skewed>(g, u, index, d, face, m);
+  for (int m = 0; m < 3; ++m) force[m] = (end == 0 ? viscosity : -viscosity) * viscous_face<skewed>(g, u, index, d, face, m);
   return force - (dot(force, area) / dot(area, area)) * area;
 }
 
 /// stress [cell, 3] of owned cells, kPa, of the fluid alone: the mean over a cell's walls; zero where it has none.
 template <bool skewed>
-void wall_stress_field(const GridViews& grid, const ViscousCoefficients& coefficients, const WallSides& sides,
-                       double viscosity, const Components<double>& u, const Components<double>& stress) {
+void wall_stress_field(const GridViews& grid, const ViscousCoefficients& coefficients, const WallSides& sides, double viscosity,
+                       const Components<double>& u, const Components<double>& stress) {
   const IndexSpace index = grid.index;
   const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
   const auto kind = grid.base_kind;

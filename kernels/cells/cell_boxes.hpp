@@ -33,8 +33,7 @@ inline void measure_boxes(const SurfaceSet& set, int cells, double ahead_us, con
           double low = 0, high = 0;
           Kokkos::parallel_reduce(
               Kokkos::TeamThreadRange(team, begin, end),
-              [&](int i, double& least) { least = smaller(least, smaller(x(i, d), x(i, d) + ahead_us * v(i, d))); },
-              Smallest(low));
+              [&](int i, double& least) { least = smaller(least, smaller(x(i, d), x(i, d) + ahead_us * v(i, d))); }, Smallest(low));
           Kokkos::parallel_reduce(
               Kokkos::TeamThreadRange(team, begin, end),
               [&](int i, double& most) { most = larger(most, larger(x(i, d), x(i, d) + ahead_us * v(i, d))); }, Largest(high));
@@ -58,8 +57,8 @@ KOKKOS_INLINE_FUNCTION double periods_from_origin(const PeriodicFrame& frame, co
   return dot(place - frame.origin, frame.dual[d]);
 }
 
-inline Departures find_departures(int cells, const Table<double>& now, const Table<double>& before, double skin,
-                                  const PeriodicFrame& frame, double share) {
+inline Departures find_departures(int cells, const Table<double>& now, const Table<double>& before, double skin, const PeriodicFrame& frame,
+                                  double share) {
   Sums<2> left;
   Kokkos::parallel_reduce(
       "corpuscle::cells::find_departures", Policy(0, cells),

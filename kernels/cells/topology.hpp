@@ -48,9 +48,8 @@ inline void append_tables(const SurfaceSet& of, int before_vertices, int before_
         }
       });
   Kokkos::parallel_for(
-      "corpuscle::cells::append_rings", Policy(0, from.vertices + 1), KOKKOS_LAMBDA(int i) {
-        to.place_ring_start(before_vertices + i) = 3 * before_triangles + from.place_ring_start(i);
-      });
+      "corpuscle::cells::append_rings", Policy(0, from.vertices + 1),
+      KOKKOS_LAMBDA(int i) { to.place_ring_start(before_vertices + i) = 3 * before_triangles + from.place_ring_start(i); });
 }
 
 }  // namespace corpuscle

@@ -12,8 +12,7 @@ class ChebyshevSteps {
   };
 
   /// @param lowest, highest  bounds of the eigenvalues, 0 < lowest < highest
-  ChebyshevSteps(double lowest, double highest)
-      : centre_((highest + lowest) / 2), radius_((highest - lowest) / 2), rho_(0) {}
+  ChebyshevSteps(double lowest, double highest) : centre_((highest + lowest) / 2), radius_((highest - lowest) / 2), rho_(0) {}
 
   Step next() {
     if (rho_ == 0) {

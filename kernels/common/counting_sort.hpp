@@ -13,8 +13,7 @@ namespace corpuscle {
 /// @param start  [bin + 1] first of `order` in each bin
 /// @param order  [item] room for all items
 template <class Bin>
-void counting_sort(const std::string& label, int count, int bins, const Bin& bin, const Array<int>& start,
-                   const Array<int>& order) {
+void counting_sort(const std::string& label, int count, int bins, const Bin& bin, const Array<int>& start, const Array<int>& order) {
   Kokkos::deep_copy(Exec(), start, 0);
   Kokkos::parallel_for(
       label + "_count", Policy(0, count), KOKKOS_LAMBDA(int item) {

@@ -22,9 +22,7 @@ class Extreme {
 
   KOKKOS_INLINE_FUNCTION explicit Extreme(double& value) : value_(&value) {}
 
-  KOKKOS_INLINE_FUNCTION void join(double& into, const double& from) const {
-    into = largest ? larger(into, from) : smaller(into, from);
-  }
+  KOKKOS_INLINE_FUNCTION void join(double& into, const double& from) const { into = largest ? larger(into, from) : smaller(into, from); }
   // Kokkos 3 joins partial results through volatile references.
   KOKKOS_INLINE_FUNCTION void join(volatile double& into, const volatile double& from) const {
     into = largest ? larger(into, from) : smaller(into, from);

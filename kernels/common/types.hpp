@@ -71,8 +71,6 @@ using Policy = Kokkos::RangePolicy<Exec>;
 #endif
 
 /// Uninitialised labelled allocation; every view in the program carries a label "corpuscle::module::name".
-inline auto uninitialised(const std::string& label) {
-  return Kokkos::view_alloc(label, Kokkos::WithoutInitializing);
-}
+inline auto uninitialised(const std::string& label) { return Kokkos::view_alloc(label, Kokkos::WithoutInitializing); }
 
 }  // namespace corpuscle

@@ -27,9 +27,7 @@ struct ContactLaw {
     return pressure * range * (1 / u + 2 * std::log(u) - u);
   }
   /// -dP/dd, kPa/um.
-  KOKKOS_INLINE_FUNCTION double steep_stiffness(double d) const {
-    return 2 * pressure * (range / d - 1) * range / (d * d);
-  }
+  KOKKOS_INLINE_FUNCTION double steep_stiffness(double d) const { return 2 * pressure * (range / d - 1) * range / (d * d); }
 
   /// kPa that drives the surfaces apart; negative gaps are as if less than nothing were left.
   KOKKOS_INLINE_FUNCTION double repulsion(double d) const {
@@ -51,8 +49,7 @@ struct ContactLaw {
   };
   KOKKOS_INLINE_FUNCTION Well steep_well(double d) const {
     const double e = std::exp(-steepness * (d - range));
-    return {depth * ((1 - e) * (1 - e) - 1), -2 * depth * steepness * (1 - e) * e,
-            2 * depth * steepness * steepness * (2 * e - 1) * e};
+    return {depth * ((1 - e) * (1 - e) - 1), -2 * depth * steepness * (1 - e) * e, 2 * depth * steepness * steepness * (2 * e - 1) * e};
   }
   /// Energy of the aggregation and minus its derivative.
   KOKKOS_INLINE_FUNCTION void aggregation(double d, double& energy, double& drive) const {

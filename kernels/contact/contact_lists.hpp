@@ -154,11 +154,12 @@ inline void fill_items(const ContactSearch& search, const ContactItems& items, c
       "corpuscle::contact::fill_items", Policy(0, s.surface.vertices), KOKKOS_LAMBDA(int v) {
         const int begin = out.first(v);
         int end = begin;
-        if (begin < out.first(v + 1)) s.visit(v, [&](int item) {
-          int to = end++;
-          for (; to > begin && out.item(to - 1) > item; --to) out.item(to) = out.item(to - 1);
-          out.item(to) = item;
-        });
+        if (begin < out.first(v + 1))
+          s.visit(v, [&](int item) {
+            int to = end++;
+            for (; to > begin && out.item(to - 1) > item; --to) out.item(to) = out.item(to - 1);
+            out.item(to) = item;
+          });
         int groups = 0;
         for (int e = begin, first = begin; e < end; ++e)
           if (e == begin || !within_group(s.surface, out.item(first), out.item(e))) first = e, ++groups;

@@ -14,13 +14,13 @@ inline void sort_hits(const SurfaceSet& surface, int groups, const ContactViews&
   const auto item = contacts.item;
   const auto push = pushes.push;
   counting_sort(
-      "corpuscle::contact::sort_hits", groups, s.triangles,
-      KOKKOS_LAMBDA(int g) { return push(g) != 0 ? item_triangle(s, item(g)) : -1; }, pushes.hit_start, pushes.hit);
+      "corpuscle::contact::sort_hits", groups, s.triangles, KOKKOS_LAMBDA(int g) { return push(g) != 0 ? item_triangle(s, item(g)) : -1; },
+      pushes.hit_start, pushes.hit);
 }
 
 /// Adds the pushes to `sum` [vertex, 3] of the first `vertices`. After sort_hits().
-inline void add_pushes(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
-                       const ContactPushes& pushes, int vertices, const Components<double>& sum) {
+inline void add_pushes(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts, const ContactPushes& pushes,
+                       int vertices, const Components<double>& sum) {
   const SurfaceSet s = surface;
   const auto first = lists.first_group;
   const ContactViews c = contacts;
@@ -42,8 +42,8 @@ inline void add_pushes(const SurfaceSet& surface, const ContactLists& lists, con
 }
 
 /// push: the force between a vertex and a triangle, nN. Each of two bodies sees the other, so each counts half.
-inline void contact_forces(const SurfaceSet& surface, const ContactLaw& contact_law, const ContactRest& at_rest,
-                           const ContactLists& lists, const ContactViews& contacts, const Array<double>& push) {
+inline void contact_forces(const SurfaceSet& surface, const ContactLaw& contact_law, const ContactRest& at_rest, const ContactLists& lists,
+                           const ContactViews& contacts, const Array<double>& push) {
   const SurfaceSet s = surface;
   const ContactLaw law = contact_law;
   const ContactRest rest = at_rest;
@@ -70,7 +70,8 @@ inline double contact_energy(const SurfaceSet& surface, const ContactLaw& contac
       "corpuscle::contact::energy", Policy(0, s.vertices),
       KOKKOS_LAMBDA(int v, double& sum) {
         for (int g = first(v); g < first(v + 1); ++g)
-          if (c.item(g) >= 0 && counts(s, v, c.item(g), own)) sum += 0.5 * rest.area_of(s, v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
+          if (c.item(g) >= 0 && counts(s, v, c.item(g), own))
+            sum += 0.5 * rest.area_of(s, v) * law.total_energy(c.gap(g), !same_body(s, v, c.item(g)));
       },
       energy);
   return energy;

@@ -64,8 +64,7 @@ KOKKOS_INLINE_FUNCTION bool counts(const SurfaceSet& s, int vertex, int item, in
   return vertex < own || (s.vertex_body(vertex) >= s.cells && s.triangle(item_triangle(s, item), 0) < own);
 }
 KOKKOS_INLINE_FUNCTION bool same_group(const SurfaceSet& s, int item, int other) {
-  return item_image(s, item) == item_image(s, other) &&
-         s.triangle_body(item_triangle(s, item)) == s.triangle_body(item_triangle(s, other));
+  return item_image(s, item) == item_image(s, other) && s.triangle_body(item_triangle(s, item)) == s.triangle_body(item_triangle(s, other));
 }
 
 }  // namespace corpuscle

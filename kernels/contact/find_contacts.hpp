@@ -6,8 +6,8 @@
 
 namespace corpuscle {
 
-/// Unit normal, and how far it is to be relied on: all the way for triangles of some height and those of rigid bodies, not at all for those of
-/// membranes whose corners lie nearly on a line, which may well look inward.
+/// Unit normal, and how far it is to be relied on: all the way for triangles of some height and those of rigid bodies, not at all for those
+/// of membranes whose corners lie nearly on a line, which may well look inward.
 struct FaceNormal {
   Vec3 unit;
   double trust;
@@ -73,8 +73,7 @@ struct Nearest {
 };
 
 /// Stores a group's nearest point: of another body's the gap is positive outside, of the own one everywhere.
-KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bool own, const Nearest& best,
-                                          const ContactViews& c, int g) {
+KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bool own, const Nearest& best, const ContactViews& c, int g) {
   const int t = item_triangle(s, best.item);
   const Corners k = corners(s, t, {});
   const Vec3 away = p - (best.at.weight[0] * k.a + best.at.weight[1] * k.b + best.at.weight[2] * k.c);
@@ -85,8 +84,7 @@ KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bo
   const bool inside = dot(away, outward) < 0 && (own || winding_around(s, s.triangle_body(t), p) > 0.5);
   // On the surface itself the direction is the surface's.
   const double length = norm(outward);
-  const Vec3 along =
-      distance > 1e-9 ? (1 / distance) * away : (length > 0 ? (inside ? -1.0 : 1.0) / length : 0.0) * outward;
+  const Vec3 along = distance > 1e-9 ? (1 / distance) * away : (length > 0 ? (inside ? -1.0 : 1.0) / length : 0.0) * outward;
   const double sign = inside && !own ? -1 : 1;
   c.item(g) = best.item;
   c.gap(g) = sign * distance;
@@ -100,9 +98,8 @@ KOKKOS_INLINE_FUNCTION void store_contact(const SurfaceSet& s, const Vec3& p, bo
 /// (without the skin). What is found does not depend on what else is in the lists.
 /// @param spheres  of the present positions
 /// @param before   [group] items found with these lists before, or -1: what is nearest is seldom farther than they are
-inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts, const ContactReach& far,
-                          const TriangleSpheres& spheres, const Array<int>& before, const ContactLists& lists,
-                          const ContactViews& contacts) {
+inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts, const ContactReach& far, const TriangleSpheres& spheres,
+                          const Array<int>& before, const ContactLists& lists, const ContactViews& contacts) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const ContactReach reach = far;
@@ -147,8 +144,8 @@ inline void find_contacts(const SurfaceSet& surface, const Images& image_shifts,
 }
 
 /// gap [vertex] to the nearest other body, um; `none` where there is none within reach.
-inline void gaps_to_others(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts,
-                           double none, const Array<double>& gap) {
+inline void gaps_to_others(const SurfaceSet& surface, const ContactLists& lists, const ContactViews& contacts, double none,
+                           const Array<double>& gap) {
   const SurfaceSet s = surface;
   const ContactLists in = lists;
   const ContactViews c = contacts;
@@ -188,8 +185,8 @@ inline double least_gap(GapWithin within, const SurfaceSet& surface, const Conta
 inline double least_of(int vertices, const Array<double>& gap) {
   double least = 1e30;
   Kokkos::parallel_reduce(
-      "corpuscle::contact::least_gap", Policy(0, vertices),
-      KOKKOS_LAMBDA(int v, double& sum) { sum = smaller(sum, gap(v)); }, Smallest(least));
+      "corpuscle::contact::least_gap", Policy(0, vertices), KOKKOS_LAMBDA(int v, double& sum) { sum = smaller(sum, gap(v)); },
+      Smallest(least));
   return least;
 }
 

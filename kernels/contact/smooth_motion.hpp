@@ -38,7 +38,7 @@ struct MotionSince {
 };
 
 /// Products of the terms with each other, row by row of the upper half, and behind them with the velocities.
-using MotionProducts = Sums<SmoothMotion::terms * (SmoothMotion::terms + 1) / 2 + 3 * SmoothMotion::terms>;
+using MotionProducts = Sums<SmoothMotion::terms*(SmoothMotion::terms + 1) / 2 + 3 * SmoothMotion::terms>;
 
 /// Over every so manieth vertex. @param motion  its middle and size
 inline MotionProducts motion_products(const SurfaceSet& surface, const SmoothMotion& motion, int every) {

@@ -60,7 +60,8 @@ MeanMotion mean_motion(const SurfaceSet& surface, const Positions& positions, co
 
 /// Of all vertices.
 struct StepWays : Joined<StepWays> {
-  double whole = 0;  // um, beyond what all do together, from where the lists were made to where the present velocity brings a vertex in a step
+  double whole =
+      0;  // um, beyond what all do together, from where the lists were made to where the present velocity brings a vertex in a step
   double drift = 0;  // um, the same in space, with what all do together
   LongestWay step;   // what one step may have made of `whole`, or will beyond the mean of all
 
@@ -101,7 +102,7 @@ StepWays step_ways(const SurfaceSet& surface, const Positions& positions, const 
 /// The longest way towards or away from a triangle in its list that a vertex makes in a step, if it is longer than `least` and than
 /// their distance: it comes from the other side, or is about to go there. Of the contacts that count.
 inline LongestWay longest_passage(const SurfaceSet& surface, const Images& image_shifts, const ContactLists& lists, int own_vertices,
-                                   double dt, double least) {
+                                  double dt, double least) {
   const SurfaceSet s = surface;
   const Images images = image_shifts;
   const ContactLists in = lists;

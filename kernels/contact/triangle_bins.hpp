@@ -68,8 +68,8 @@ inline void sort_triangles(const SurfaceSet& surface, const TriangleBins& bins) 
   const SurfaceSet s = surface;
   const TriangleBins b = bins;
   counting_sort(
-      "corpuscle::contact::sort_triangles", s.triangles, b.count(),
-      KOKKOS_LAMBDA(int t) { return b.bin_of(centre_of(corners(s, t, {}))); }, b.start, b.order);
+      "corpuscle::contact::sort_triangles", s.triangles, b.count(), KOKKOS_LAMBDA(int t) { return b.bin_of(centre_of(corners(s, t, {}))); },
+      b.start, b.order);
 }
 
 }  // namespace corpuscle

@@ -18,8 +18,7 @@ struct WallGap {
 /// The wall's plane where the grid line of the lattice point xi along d ends; far unless the point is within a few of the cells
 /// next to the wall, or within twice the reach by their width: a plane knows nothing of how the wall bends, and in a tube that
 /// turns back cells far away are behind the plane of its end.
-KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p, const double (&xi)[3], int d,
-                                           int end, double reach) {
+KOKKOS_INLINE_FUNCTION WallGap gap_to_side(const Lattice& lattice, const Vec3& p, const double (&xi)[3], int d, int end, double reach) {
   constexpr double few = 4;  // cells
   double at_wall[3] = {xi[0], xi[1], xi[2]};
   at_wall[d] = end == 0 ? -1 : lattice.index.n[d];
@@ -63,8 +62,8 @@ struct WallLinks {
 };
 
 /// The nearest of the walls within `reach` of a point that is at a marker or not far from it.
-KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSides& walls, const WallLinks& links,
-                                            const double (&eta)[3], const Vec3& p, double reach) {
+KOKKOS_INLINE_FUNCTION WallGap nearest_wall(const Lattice& lattice, const WallSides& walls, const WallLinks& links, const double (&eta)[3],
+                                            const Vec3& p, double reach) {
   double xi[3];
   for (int d = 0; d < 3; ++d) {  // from walls half a cell away to walls at nodes of their own
     const double last = lattice.index.n[d] - 1;
@@ -145,8 +144,8 @@ struct WallContacts {
   Lattice lattice;
   MarkerViews markers;
   WallSides walls;
-  SurfaceSet surface;    // of the vertices
-  double reach = 0;      // um
+  SurfaceSet surface;  // of the vertices
+  double reach = 0;    // um
   WallLinks links{};
 
   /// Of a marker's vertex; far where no wall is within reach, or the marker is not at home.

@@ -51,8 +51,7 @@ inline void factorise_band(const BandSystem& band) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const BandSystem a = band;
   Kokkos::parallel_for(
-      "corpuscle::multigrid::factorise_band", Team(1, Kokkos::AUTO, band_lanes),
-      KOKKOS_LAMBDA(const Team::member_type& team) {
+      "corpuscle::multigrid::factorise_band", Team(1, Kokkos::AUTO, band_lanes), KOKKOS_LAMBDA(const Team::member_type& team) {
         for (int j = 0; j < a.rows; ++j) {
           const double pivot = band_pivot(a, j);
           Kokkos::parallel_for(Kokkos::TeamThreadRange(team, a.width), [&](int n) {
@@ -71,9 +70,8 @@ inline void factorise_band(const BandSystem& band) {
         });
         team.team_barrier();
         Kokkos::parallel_for(Kokkos::TeamThreadRange(team, a.rows), [&](int j) {
-          Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width), [&](int d) {
-            a.upper(j, d + 1) = j > d ? a.lower(j - d - 1, d + 1) : 0.0;
-          });
+          Kokkos::parallel_for(Kokkos::ThreadVectorRange(team, a.width),
+                               [&](int d) { a.upper(j, d + 1) = j > d ? a.lower(j - d - 1, d + 1) : 0.0; });
         });
       });
 }
@@ -147,7 +145,8 @@ inline void invert_band(const BandSystem& band, const Table<double>& inverse) {
       });
 }
 
-/// The row of x = the inverse times b, both [cell] of the level. The inverse is symmetric: threads with rows side by side read side by side.
+/// The row of x = the inverse times b, both [cell] of the level. The inverse is symmetric: threads with rows side by side read side by
+/// side.
 KOKKOS_INLINE_FUNCTION void apply_inverse(const BandSystem& a, const Table<double>& inverse, const Array<CycleReal>& b,
                                           const Array<CycleReal>& x, int row) {
   double sum = 0;

@@ -15,13 +15,13 @@ struct CgProducts {
 };
 
 struct CgState {
-  double scale = 1;          // r times this is what the cycle saw
+  double scale = 1;  // r times this is what the cycle saw
   double next_scale = 1;
   double alpha = 0, beta = 0;
-  double rz = 0, ps = 0;     // of the last iteration: r . z, direction . image
+  double rz = 0, ps = 0;           // of the last iteration: r . z, direction . image
   double norm = 0, tolerance = 0;  // 2-norm of r, and what ends the solve
   int iterations = 0, most = 0;
-  int done = 0;              // what is done beyond changes nothing
+  int done = 0;  // what is done beyond changes nothing
 };
 
 /// From an iteration's products to its step, and the residual that it leaves.
@@ -51,22 +51,27 @@ KOKKOS_INLINE_FUNCTION CgState cg_step(const CgState& before, const Sums<CgProdu
 inline void cg_products(const LevelOperator<double>& level, const Array<CycleReal>& z, const Array<double>& r, const Array<double>& s,
                         const Array<double>& w, const Kokkos::View<Sums<CgProducts::count>, Memory>& products) {
   const IndexSpace index = level.index;
-  sums_owned("corpuscle::multigrid::operator", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    using P = CgProducts;
-    const int c = index.cell(i, j, k);
-    const double image = level.apply(z, c), own = z(c);
-    w(c) = image;
-    Sums<P::count> sums;
-    sums[P::rr] = r(c) * r(c), sums[P::rz] = r(c) * own, sums[P::zw] = own * image, sums[P::zs] = own * s(c), sums[P::rw] = r(c) * image;
-    sums[P::ww] = image * image, sums[P::rs] = r(c) * s(c), sums[P::ws] = image * s(c), sums[P::ss] = s(c) * s(c);
-    return sums;
-  }, products);
+  sums_owned(
+      "corpuscle::multigrid::operator", index,
+      KOKKOS_LAMBDA(int i, int j, int k) {
+        using P = CgProducts;
+        const int c = index.cell(i, j, k);
+        const double image = level.apply(z, c), own = z(c);
+        w(c) = image;
+        Sums<P::count> sums;
+        sums[P::rr] = r(c) * r(c), sums[P::rz] = r(c) * own, sums[P::zw] = own * image, sums[P::zs] = own * s(c),
+        sums[P::rw] = r(c) * image;
+        sums[P::ww] = image * image, sums[P::rs] = r(c) * s(c), sums[P::ws] = image * s(c), sums[P::ss] = s(c) * s(c);
+        return sums;
+      },
+      products);
 }
 
 inline void cg_step_on_device(const Kokkos::View<Sums<CgProducts::count>, Memory>& products, const Kokkos::View<CgState, Memory>& state) {
   const auto of = products;
   const auto now = state;
-  Kokkos::parallel_for("corpuscle::multigrid::step", Policy(0, 1), KOKKOS_LAMBDA(int) { now() = cg_step(now(), of()); });
+  Kokkos::parallel_for(
+      "corpuscle::multigrid::step", Policy(0, 1), KOKKOS_LAMBDA(int) { now() = cg_step(now(), of()); });
 }
 
 /// The state where it is, for loops on a device; its value, for those of processors, which would read it for every cell.
@@ -84,17 +89,18 @@ template <class State>
 void cg_advance(const IndexSpace& index, const State& cg, const Array<CycleReal>& z, const Array<double>& w, const Array<double>& p,
                 const Array<double>& s, const Array<double>& x, const Array<double>& r, const Array<CycleReal>& b) {
   const State now = cg;
-  for_owned("corpuscle::multigrid::advance", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const CgState& step = now();
-    const double alpha = step.alpha, beta = step.beta, per = 1 / step.scale, scale = step.next_scale;
-    const int c = index.cell(i, j, k);
-    const double direction = per * z(c) + beta * p(c), image = per * w(c) + beta * s(c);
-    p(c) = direction, s(c) = image;
-    x(c) += alpha * direction;
-    const double left = r(c) - alpha * image;
-    r(c) = left;
-    b(c) = scale * left;
-  });
+  for_owned(
+      "corpuscle::multigrid::advance", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const CgState& step = now();
+        const double alpha = step.alpha, beta = step.beta, per = 1 / step.scale, scale = step.next_scale;
+        const int c = index.cell(i, j, k);
+        const double direction = per * z(c) + beta * p(c), image = per * w(c) + beta * s(c);
+        p(c) = direction, s(c) = image;
+        x(c) += alpha * direction;
+        const double left = r(c) - alpha * image;
+        r(c) = left;
+        b(c) = scale * left;
+      });
 }
 
 }  // namespace corpuscle

@@ -22,8 +22,8 @@ struct EnergyColumn {
 /// is half a spacing away. Summed over all nodes this is what the discrete viscous force takes out of the flow. A face
 /// towards the inside of a body has no meaning: the opposite one stands for it.
 template <bool skewed>
-KOKKOS_INLINE_FUNCTION double node_gradient_square(const ViscousCoefficients& g, const Components<double>& u,
-                                                   const Array<NodeKind>& kind, const IndexSpace& index, int c) {
+KOKKOS_INLINE_FUNCTION double node_gradient_square(const ViscousCoefficients& g, const Components<double>& u, const Array<NodeKind>& kind,
+                                                   const IndexSpace& index, int c) {
   double total = 0;
   for (int d = 0; d < 3; ++d) {
     const int s = index.stride(d);
@@ -85,11 +85,13 @@ inline double excess_dissipation(const GridViews& grid, const VaryingViscosity& 
                                  const Components<double>& u) {
   const VaryingViscosity v = viscosity;
   const IndexSpace index = grid.index;
-  return sum_owned("corpuscle::fluid::excess_dissipation", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    if (kind(c) != NodeKind::fluid || (v.least != 1 && uniform_beside_body(v, kind, index, c))) return 0.0;
-    return face_dissipation<0>(v, u, kind, index, c) + face_dissipation<1>(v, u, kind, index, c) + face_dissipation<2>(v, u, kind, index, c);
-  });
+  return sum_owned(
+      "corpuscle::fluid::excess_dissipation", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        if (kind(c) != NodeKind::fluid || (v.least != 1 && uniform_beside_body(v, kind, index, c))) return 0.0;
+        return face_dissipation<0>(v, u, kind, index, c) + face_dissipation<1>(v, u, kind, index, c) +
+               face_dissipation<2>(v, u, kind, index, c);
+      });
 }
 
 /// Sides of the grid: boxes of boundary nodes, each with its direction and end (0 low, 1 high).
@@ -110,9 +112,9 @@ struct GridSides {
 /// carries, with `rho` zero where convection is left out. Second: the volume that flows in, um3/us. Pressure on a face without one of
 /// its own is extended from the two nodes beside it.
 template <bool skewed>
-Sums<2> boundary_power(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind,
-                       const PressureMask& mask, double rho, double mu, const Components<double>& u,
-                       const Array<double>& p, const Array<double> (&flux)[3], const GridSides& sides) {
+Sums<2> boundary_power(const GridViews& grid, const ViscousCoefficients& g, const Array<NodeKind>& kind, const PressureMask& mask,
+                       double rho, double mu, const Components<double>& u, const Array<double>& p, const Array<double> (&flux)[3],
+                       const GridSides& sides) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   const GridSides of = sides;

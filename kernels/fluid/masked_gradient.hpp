@@ -28,8 +28,8 @@ struct NoFaceForce {
 /// Central where both neighbours have a pressure, one-sided where one has, zero where none has; less the force on the faces
 /// between.
 template <class P, class Force>
-KOKKOS_INLINE_FUNCTION Difference masked_difference(const P& p, const PressureMask& mask, const Components<double>& x, int c,
-                                                    int stride, const Force& force, int d) {
+KOKKOS_INLINE_FUNCTION Difference masked_difference(const P& p, const PressureMask& mask, const Components<double>& x, int c, int stride,
+                                                    const Force& force, int d) {
   const int low = mask(c - stride) ? c - stride : c, high = mask(c + stride) ? c + stride : c;
   if (low == high) return {0, central_offset(x, c, stride)};
   const double scale = (low != c && high != c) ? 0.5 : 1.0;
@@ -38,15 +38,14 @@ KOKKOS_INLINE_FUNCTION Difference masked_difference(const P& p, const PressureMa
 }
 
 template <class P>
-KOKKOS_INLINE_FUNCTION Difference masked_difference(const P& p, const PressureMask& mask, const Components<double>& x, int c,
-                                                    int stride) {
+KOKKOS_INLINE_FUNCTION Difference masked_difference(const P& p, const PressureMask& mask, const Components<double>& x, int c, int stride) {
   return masked_difference(p, mask, x, c, stride, NoFaceForce(), 0);
 }
 
 /// Gradient at a fluid node, less the force there.
 template <class P, class Force = NoFaceForce>
-KOKKOS_INLINE_FUNCTION Vec3 cell_gradient(const P& p, const PressureMask& mask, const Components<double>& x,
-                                          const IndexSpace& index, int c, const Force& force = {}) {
+KOKKOS_INLINE_FUNCTION Vec3 cell_gradient(const P& p, const PressureMask& mask, const Components<double>& x, const IndexSpace& index, int c,
+                                          const Force& force = {}) {
   const Difference d0 = masked_difference(p, mask, x, c, index.stride(0), force, 0);
   const Difference d1 = masked_difference(p, mask, x, c, index.stride(1), force, 1);
   const Difference d2 = masked_difference(p, mask, x, c, index.stride(2), force, 2);
@@ -57,9 +56,8 @@ KOKKOS_INLINE_FUNCTION Vec3 cell_gradient(const P& p, const PressureMask& mask, 
 /// (gradient - force) . area on the face between c - stride(d) and c, both of which have a pressure. On an orthogonal grid
 /// the cross terms vanish and the coefficient alone is used.
 template <bool skewed, class P, class Force = NoFaceForce>
-KOKKOS_INLINE_FUNCTION double face_gradient(const P& p, const PressureMask& mask, const Components<double>& x,
-                                            const Vec3& area, double coefficient, const IndexSpace& index, int d, int c,
-                                            const Force& force = {}) {
+KOKKOS_INLINE_FUNCTION double face_gradient(const P& p, const PressureMask& mask, const Components<double>& x, const Vec3& area,
+                                            double coefficient, const IndexSpace& index, int d, int c, const Force& force = {}) {
   const int low = c - index.stride(d);
   if constexpr (!skewed) {
     return coefficient * (p(c) - p(low) - force(d, c));

@@ -49,10 +49,9 @@ struct LevelOperator {
   template <class Field>
   KOKKOS_FORCEINLINE_FUNCTION auto apply(const Field& x, int c) const {
     const int s1 = index.stride(1), s2 = index.stride(2);
-    return diagonal(c) * value_at(x, c) - conductance[0](c) * value_at(x, c - 1) -
-           conductance[0](c + 1) * value_at(x, c + 1) - conductance[1](c) * value_at(x, c - s1) -
-           conductance[1](c + s1) * value_at(x, c + s1) - conductance[2](c) * value_at(x, c - s2) -
-           conductance[2](c + s2) * value_at(x, c + s2);
+    return diagonal(c) * value_at(x, c) - conductance[0](c) * value_at(x, c - 1) - conductance[0](c + 1) * value_at(x, c + 1) -
+           conductance[1](c) * value_at(x, c - s1) - conductance[1](c + s1) * value_at(x, c + s1) -
+           conductance[2](c) * value_at(x, c - s2) - conductance[2](c + s2) * value_at(x, c + s2);
   }
 };
 
@@ -81,10 +80,11 @@ void mask_conductances(const Array<double> (&coefficient)[3], const PressureMask
     const int stride = index.stride(d);
     std::array<int, 3> upper{index.n[0] + 1, index.n[1] + 1, index.n[2] + 1};
     upper[d] += 1;
-    for_box("corpuscle::multigrid::conductance", {-1, -1, -1}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
-      const int c = index.cell(i, j, k);
-      g(c) = mask(c) && mask(c - stride) ? from(c) * mean_viscosity(relative, c, c - stride) : 0.0;
-    });
+    for_box(
+        "corpuscle::multigrid::conductance", {-1, -1, -1}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+          const int c = index.cell(i, j, k);
+          g(c) = mask(c) && mask(c - stride) ? from(c) * mean_viscosity(relative, c, c - stride) : 0.0;
+        });
   }
 }
 
@@ -106,30 +106,31 @@ inline void coarsen_conductances(const MultigridLevel& fine, const MultigridLeve
     const auto g = coarse.conductance[d];
     std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
     upper[d] += 1;
-    for_box("corpuscle::multigrid::coarsen", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
-      const int at[3] = {i, j, k};
-      int first[3];
-      for (int m = 0; m < 3; ++m) first[m] = fine.factor[m] * at[m] + fine.shift[m];
-      const bool low = index.first[d] + at[d] == 0 && !index.periodic[d];
-      const bool high = index.first[d] + at[d] == index.global[d];
-      if (high) first[d] = fine_index.n[d];
-      const int below = low ? 0 : children(fine, d, at[d] - 1);
-      const int above = !high ? children(fine, d, at[d]) : (index.periodic[d] ? fine.factor[d] : 0);
-      const CycleReal cells = low ? above : (above == 0 ? below : CycleReal(0.5) * (above + below));
-      const int c = fine_index.cell(first[0], first[1], first[2]);
-      CycleReal sum = 0;
-      for (int b = 0; b < children(fine, f, at[f]); ++b)
-        for (int a = 0; a < children(fine, e, at[e]); ++a)
-          sum += fine.conductance[d](c + a * fine_index.stride(e) + b * fine_index.stride(f));
-      g(all.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2])) = sum / cells;
-    });
+    for_box(
+        "corpuscle::multigrid::coarsen", {0, 0, 0}, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+          const int at[3] = {i, j, k};
+          int first[3];
+          for (int m = 0; m < 3; ++m) first[m] = fine.factor[m] * at[m] + fine.shift[m];
+          const bool low = index.first[d] + at[d] == 0 && !index.periodic[d];
+          const bool high = index.first[d] + at[d] == index.global[d];
+          if (high) first[d] = fine_index.n[d];
+          const int below = low ? 0 : children(fine, d, at[d] - 1);
+          const int above = !high ? children(fine, d, at[d]) : (index.periodic[d] ? fine.factor[d] : 0);
+          const CycleReal cells = low ? above : (above == 0 ? below : CycleReal(0.5) * (above + below));
+          const int c = fine_index.cell(first[0], first[1], first[2]);
+          CycleReal sum = 0;
+          for (int b = 0; b < children(fine, f, at[f]); ++b)
+            for (int a = 0; a < children(fine, e, at[e]); ++a)
+              sum += fine.conductance[d](c + a * fine_index.stride(e) + b * fine_index.stride(f));
+          g(all.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2])) = sum / cells;
+        });
   }
 }
 
 // What a cycle does to one cell.
 
-/// coarse = sums over the joined cells, for a cell of this rank's part of the coarser level. Without branches, so that it vectorises: what is
-/// not joined is read (it is never beyond the halo) and counts nothing.
+/// coarse = sums over the joined cells, for a cell of this rank's part of the coarser level. Without branches, so that it vectorises: what
+/// is not joined is read (it is never beyond the halo) and counts nothing.
 template <class Field>
 struct RestrictSums {
   MultigridLevel fine;
@@ -138,8 +139,8 @@ struct RestrictSums {
 
   KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
     const int s1 = fine.index.stride(1), s2 = fine.index.stride(2);
-    const int c = fine.index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1],
-                                  fine.factor[2] * k + fine.shift[2]);
+    const int c =
+        fine.index.cell(fine.factor[0] * i + fine.shift[0], fine.factor[1] * j + fine.shift[1], fine.factor[2] * k + fine.shift[2]);
     const CycleReal w0 = children(fine, 0, i) - 1, w1 = children(fine, 1, j) - 1, w2 = children(fine, 2, k) - 1;
     const auto pair = [&](int at) { return value_at(values, at) + w0 * value_at(values, at + 1); };
     set_value(coarse_values, coarse.cell(i + fine.begin[0], j + fine.begin[1], k + fine.begin[2]),
@@ -159,26 +160,27 @@ void level_diagonals(const LevelOperator<Real>& level, const bool (&closed)[3][2
   bool low[3], high[3];
   for (int d = 0; d < 3; ++d) low[d] = closed[d][0], high[d] = closed[d][1];
   const bool l0 = low[0], l1 = low[1], l2 = low[2], h0 = high[0], h1 = high[1], h2 = high[2];
-  for_owned("corpuscle::multigrid::diagonal", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    Real sum = own(c);
-    if (i > 0 || !l0) sum += level.conductance[0](c);
-    if (j > 0 || !l1) sum += level.conductance[1](c);
-    if (k > 0 || !l2) sum += level.conductance[2](c);
-    if (i + 1 < index.n[0] || !h0) sum += level.conductance[0](c + index.stride(0));
-    if (j + 1 < index.n[1] || !h1) sum += level.conductance[1](c + index.stride(1));
-    if (k + 1 < index.n[2] || !h2) sum += level.conductance[2](c + index.stride(2));
-    level.diagonal(c) = sum;
-    level.inverse(c) = sum > 0 ? 1 / sum : Real(0);
-  });
+  for_owned(
+      "corpuscle::multigrid::diagonal", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        Real sum = own(c);
+        if (i > 0 || !l0) sum += level.conductance[0](c);
+        if (j > 0 || !l1) sum += level.conductance[1](c);
+        if (k > 0 || !l2) sum += level.conductance[2](c);
+        if (i + 1 < index.n[0] || !h0) sum += level.conductance[0](c + index.stride(0));
+        if (j + 1 < index.n[1] || !h1) sum += level.conductance[1](c + index.stride(1));
+        if (k + 1 < index.n[2] || !h2) sum += level.conductance[2](c + index.stride(2));
+        level.diagonal(c) = sum;
+        level.inverse(c) = sum > 0 ? 1 / sum : Real(0);
+      });
 }
 
 /// inverse from the diagonal in all cells, those of the halo too.
 template <class Real>
 void invert_diagonal(const LevelOperator<Real>& level) {
-  Kokkos::parallel_for("corpuscle::multigrid::inverse", Policy(0, level.index.size()), KOKKOS_LAMBDA(int c) {
-    level.inverse(c) = level.diagonal(c) > 0 ? 1 / level.diagonal(c) : Real(0);
-  });
+  Kokkos::parallel_for(
+      "corpuscle::multigrid::inverse", Policy(0, level.index.size()),
+      KOKKOS_LAMBDA(int c) { level.inverse(c) = level.diagonal(c) > 0 ? 1 / level.diagonal(c) : Real(0); });
 }
 
 /// own = 0 but at `pinned` (padded cell number on the rank that owns it, -1 elsewhere), where it is as large as the
@@ -187,19 +189,20 @@ inline void pin_level(const LevelOperator<CycleReal>& level, int pinned, const A
   Kokkos::deep_copy(Exec(), own, CycleReal(0));
   if (pinned < 0) return;
   const IndexSpace index = level.index;
-  Kokkos::parallel_for("corpuscle::multigrid::pin", Policy(0, 1), KOKKOS_LAMBDA(int) {
-    CycleReal sum = 0;
-    for (int d = 0; d < 3; ++d) sum += level.conductance[d](pinned) + level.conductance[d](pinned + index.stride(d));
-    own(pinned) = sum;
-  });
+  Kokkos::parallel_for(
+      "corpuscle::multigrid::pin", Policy(0, 1), KOKKOS_LAMBDA(int) {
+        CycleReal sum = 0;
+        for (int d = 0; d < 3; ++d) sum += level.conductance[d](pinned) + level.conductance[d](pinned + index.stride(d));
+        own(pinned) = sum;
+      });
 }
 
 /// Sum of the conductances along d over owned cells: how strongly that direction couples.
 inline double sum_conductances(const MultigridLevel& level, int d) {
   const IndexSpace index = level.index;
   const auto g = level.conductance[d];
-  return sum_owned("corpuscle::multigrid::strength", index,
-                   KOKKOS_LAMBDA(int i, int j, int k) { return g(index.cell(i, j, k)); });
+  return sum_owned(
+      "corpuscle::multigrid::strength", index, KOKKOS_LAMBDA(int i, int j, int k) { return g(index.cell(i, j, k)); });
 }
 
 // What follows also runs for cells of the halo, behind each line (for_box_rounded) and where other ranks do the same: beyond a physical
@@ -244,8 +247,8 @@ struct Smooth {
   KOKKOS_FORCEINLINE_FUNCTION void operator()(int i, int j, int k) const {
     const int c = level.index.cell(i, j, k);
     const auto here = value_at(x, c);
-    set_value(previous, c, here + momentum * (here - value_at(previous, c)) +
-                               weight * level.inverse(c) * (value_at(b, c) - level.apply(x, c)));
+    set_value(previous, c,
+              here + momentum * (here - value_at(previous, c)) + weight * level.inverse(c) * (value_at(b, c) - level.apply(x, c)));
   }
 };
 
@@ -311,7 +314,7 @@ struct WithImages {
   KOKKOS_FORCEINLINE_FUNCTION void end_line(int j, int k) const {
     const int first = index.cell(0, j, k);
     if (wraps[0])
-      for (int i = 0; i < index.n[0]; i += index.n[0] > 1 ? index.n[0] - 1 : 1) copy_to_image(0, i, first + i);
+      for (int i = 0; i<index.n[0]; i += index.n[0]> 1 ? index.n[0] - 1 : 1) copy_to_image(0, i, first + i);
     const int at[3] = {0, j, k};
     for (int d = 1; d < 3; ++d)
       if (wraps[d] && (at[d] == 0 || at[d] == index.n[d] - 1))
@@ -320,38 +323,39 @@ struct WithImages {
 };
 
 inline void compact_scalar(const IndexSpace& index, const Array<CycleReal>& field, const Array<double>& vector) {
-  for_owned("corpuscle::multigrid::to_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    vector(index.compact(i, j, k)) = field(index.cell(i, j, k));
-  });
+  for_owned(
+      "corpuscle::multigrid::to_vector", index,
+      KOKKOS_LAMBDA(int i, int j, int k) { vector(index.compact(i, j, k)) = field(index.cell(i, j, k)); });
 }
 
 /// field = scale vector.
-inline void spread_scalar(const IndexSpace& index, double scale, const Array<double>& vector,
-                          const Array<CycleReal>& field) {
-  for_owned("corpuscle::multigrid::from_vector", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    field(index.cell(i, j, k)) = scale * vector(index.compact(i, j, k));
-  });
+inline void spread_scalar(const IndexSpace& index, double scale, const Array<double>& vector, const Array<CycleReal>& field) {
+  for_owned(
+      "corpuscle::multigrid::from_vector", index,
+      KOKKOS_LAMBDA(int i, int j, int k) { field(index.cell(i, j, k)) = scale * vector(index.compact(i, j, k)); });
 }
 
 /// Matrix rows for hypre, 7 entries each in the order of RowPattern; cells without an unknown get a unit diagonal.
 inline void level_rows(const MultigridLevel& level, const Table<double>& value) {
   const IndexSpace index = level.index;
-  for_owned("corpuscle::multigrid::rows", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), r = index.compact(i, j, k);
-    value(r, 0) = level.inverse(c) > 0 ? level.diagonal(c) : CycleReal(1);
-    for (int d = 0; d < 3; ++d) {
-      value(r, 3 - d) = -level.conductance[d](c);
-      value(r, 4 + d) = -level.conductance[d](c + index.stride(d));
-    }
-  });
+  for_owned(
+      "corpuscle::multigrid::rows", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k), r = index.compact(i, j, k);
+        value(r, 0) = level.inverse(c) > 0 ? level.diagonal(c) : CycleReal(1);
+        for (int d = 0; d < 3; ++d) {
+          value(r, 3 - d) = -level.conductance[d](c);
+          value(r, 4 + d) = -level.conductance[d](c + index.stride(d));
+        }
+      });
 }
 
 template <class Real>
 double owned_dot(const IndexSpace& index, const Array<double>& a, const Array<Real>& b) {
-  return sum_owned("corpuscle::multigrid::dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    return a(c) * b(c);
-  });
+  return sum_owned(
+      "corpuscle::multigrid::dot", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        return a(c) * b(c);
+      });
 }
 
 }  // namespace corpuscle

@@ -6,8 +6,7 @@
 namespace corpuscle {
 
 /// Largest |u - (0, 0, 2 mean (1 - r^2 / R^2))| over the owned cells of layer k (local number).
-inline double poiseuille_difference(const GridViews& grid, const Components<double>& u, int k, double mean,
-                                    double radius) {
+inline double poiseuille_difference(const GridViews& grid, const Components<double>& u, int k, double mean, double radius) {
   const IndexSpace index = grid.index;
   const auto x = grid.x;
   double square = 0;
@@ -38,19 +37,20 @@ inline void layer_pressure(const GridViews& grid, const Array<double>& p, int k,
 }
 
 /// Largest difference between u and a velocity linear in coordinate d: low at `lower`, high at `upper`.
-inline double couette_difference(const GridViews& grid, const Components<double>& u, int d, double lower, double upper,
-                                 const Vec3& low, const Vec3& high) {
+inline double couette_difference(const GridViews& grid, const Components<double>& u, int d, double lower, double upper, const Vec3& low,
+                                 const Vec3& high) {
   const auto x = grid.x;
   const IndexSpace index = grid.index;
   double square = 0;
-  reduce_owned("corpuscle::fluid::couette_difference", index,
-               KOKKOS_LAMBDA(int i, int j, int k, double& most) {
-                 const int c = index.cell(i, j, k);
-                 const double s = (x(c, d) - lower) / (upper - lower);
-                 const Vec3 difference = load(u, c) - ((1 - s) * low + s * high);
-                 most = larger(most, dot(difference, difference));
-               },
-               Largest(square));
+  reduce_owned(
+      "corpuscle::fluid::couette_difference", index,
+      KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+        const int c = index.cell(i, j, k);
+        const double s = (x(c, d) - lower) / (upper - lower);
+        const Vec3 difference = load(u, c) - ((1 - s) * low + s * high);
+        most = larger(most, dot(difference, difference));
+      },
+      Largest(square));
   return std::sqrt(square);
 }
 

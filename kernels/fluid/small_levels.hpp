@@ -130,7 +130,8 @@ KOKKOS_INLINE_FUNCTION void cycle_small_levels(const Cells& cells, const SmallLe
     const SmallLevel<Field>& level = s.level[l];
     const bool changed = s.steps % 2 != 0;
     if (l < last)
-      cells.rounded(level.views.index, AddCorrection<Field>(level.views, s.level[l + 1].views.index, s.level[l + 1].x, changed ? level.y : level.x));
+      cells.rounded(level.views.index,
+                    AddCorrection<Field>(level.views, s.level[l + 1].views.index, s.level[l + 1].x, changed ? level.y : level.x));
     smooth_level(cells, s, level, 0, s.steps, changed);
   }
   wrap_level(cells, s.level[0].views.index, s.level[0].x);

@@ -13,9 +13,9 @@ struct UniformViscosity {};
 struct VaryingViscosity {
   Array<double> relative;
   double least;
-  bool bodies;             // whether there may be nodes inside bodies
-  Array<double> fluidity;  // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
-  Array<double> smooth;    // [cell] of smooth_viscosity(), then
+  bool bodies;                         // whether there may be nodes inside bodies
+  Array<double> fluidity;              // [cell] mean of 1 / viscosity where cells hold two fluids; without values: none does
+  Array<double> smooth;                // [cell] of smooth_viscosity(), then
   Components<double> x, face_area[3];  // as in GridViews
   // Of mark_excess(): what the face of each direction below a cell, and the cell itself, have beyond the uniform viscosity's.
   Array<unsigned char> marks;
@@ -37,9 +37,7 @@ KOKKOS_FORCEINLINE_FUNCTION double yielding_viscosity(const VaryingViscosity& v,
 }
 /// On the face between two nodes.
 KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const UniformViscosity&, int, int) { return 1; }
-KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const VaryingViscosity& v, int a, int b) {
-  return 0.5 * (v.relative(a) + v.relative(b));
-}
+KOKKOS_FORCEINLINE_FUNCTION double mean_viscosity(const VaryingViscosity& v, int a, int b) { return 0.5 * (v.relative(a) + v.relative(b)); }
 
 /// Differences across a face of direction d and along it, of one value after the other. (With d known when it is compiled no vector has to
 /// be looked up in memory by direction: a fifth less time.)
@@ -106,17 +104,17 @@ KOKKOS_INLINE_FUNCTION Vec3 layered_flux(const VaryingViscosity& v, double less,
 inline void smooth_viscosity(const IndexSpace& of_cells, const Array<double>& relative, const Array<double>& smooth) {
   const IndexSpace index = of_cells;
   const Array<double> from = relative, out = smooth;
-  for_box("corpuscle::fluid::excess_smooth", {-2, -2, -2}, {index.n[0] + 2, index.n[1] + 2, index.n[2] + 2},
-          KOKKOS_LAMBDA(int i, int j, int k) {
-            const int c = index.cell(i, j, k);
-            double sum = 0;
-            for (int z = -1; z <= 1; ++z)
-              for (int y = -1; y <= 1; ++y)
-                for (int x = -1; x <= 1; ++x)
-                  sum += (2 - x * x) * (2 - y * y) * (2 - z * z) *
-                         from(c + x * index.stride(0) + y * index.stride(1) + z * index.stride(2));
-            out(c) = sum / 64;
-          });
+  for_box(
+      "corpuscle::fluid::excess_smooth", {-2, -2, -2}, {index.n[0] + 2, index.n[1] + 2, index.n[2] + 2},
+      KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        double sum = 0;
+        for (int z = -1; z <= 1; ++z)
+          for (int y = -1; y <= 1; ++y)
+            for (int x = -1; x <= 1; ++x)
+              sum += (2 - x * x) * (2 - y * y) * (2 - z * z) * from(c + x * index.stride(0) + y * index.stride(1) + z * index.stride(2));
+        out(c) = sum / 64;
+      });
 }
 
 /// (r - 1) grad u . area + (r - least) grad u^T . area on the face between c - stride(d) and c, where r is the viscosity, and what two
@@ -172,33 +170,34 @@ inline void mark_excess(const VaryingViscosity& viscosity, const Array<NodeKind>
   const VaryingViscosity v = viscosity;
   const Array<NodeKind> kind = kinds;
   const IndexSpace index = of_cells;
-  for_box("corpuscle::fluid::excess_marks", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int at[3] = {i, j, k}, c = index.cell(i, j, k);
-    int beyond = 0;  // directions along which the cell is none of the owned ones
-    for (int d = 0; d < 3; ++d) beyond += at[d] == index.n[d];
-    unsigned char marks = 0;
-    bool any = false;
-    for (int d = 0; d < 3; ++d) {
-      if (beyond > (at[d] == index.n[d] ? 1 : 0)) continue;  // no face of an owned cell
-      const int low = c - index.stride(d), high = c + index.stride(d);
-      const bool below = exceeds(v, kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c));
-      if (below) marks |= VaryingViscosity::face_mark(d);
-      any = any || below || (beyond == 0 && exceeds(v, face_viscosity(v, kind, c, high)));
-    }
-    if (beyond == 0) {
-      if (any && !(v.least != 1 && uniform_beside_body(v, kind, index, c)))
-        marks |= VaryingViscosity::cell_mark;
-      else
-        store(v.force, c, Vec3{});
-    }
-    v.marks(c) = marks;
-  });
+  for_box(
+      "corpuscle::fluid::excess_marks", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int at[3] = {i, j, k}, c = index.cell(i, j, k);
+        int beyond = 0;  // directions along which the cell is none of the owned ones
+        for (int d = 0; d < 3; ++d) beyond += at[d] == index.n[d];
+        unsigned char marks = 0;
+        bool any = false;
+        for (int d = 0; d < 3; ++d) {
+          if (beyond > (at[d] == index.n[d] ? 1 : 0)) continue;  // no face of an owned cell
+          const int low = c - index.stride(d), high = c + index.stride(d);
+          const bool below = exceeds(v, kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c));
+          if (below) marks |= VaryingViscosity::face_mark(d);
+          any = any || below || (beyond == 0 && exceeds(v, face_viscosity(v, kind, c, high)));
+        }
+        if (beyond == 0) {
+          if (any && !(v.least != 1 && uniform_beside_body(v, kind, index, c)))
+            marks |= VaryingViscosity::cell_mark;
+          else
+            store(v.force, c, Vec3{});
+        }
+        v.marks(c) = marks;
+      });
 }
 
 /// v.excess of the face between c - stride(d) and c.
 template <int d, class Velocity>
-KOKKOS_INLINE_FUNCTION void find_face_excess(const VaryingViscosity& v, const Velocity& u, const Array<NodeKind>& kind, const IndexSpace& index,
-                                             int c) {
+KOKKOS_INLINE_FUNCTION void find_face_excess(const VaryingViscosity& v, const Velocity& u, const Array<NodeKind>& kind,
+                                             const IndexSpace& index, int c) {
   const int low = c - index.stride(d);
   const double r = kind(low) == NodeKind::boundary ? v.relative(low) : face_viscosity(v, kind, low, c);
   store(v.excess[d], c, excess_flux<d>(v, r, u, kind, index, c));
@@ -214,25 +213,27 @@ void find_excess(const VaryingViscosity& viscosity, const Velocity& velocity, co
   const Velocity u = velocity;
   const Array<NodeKind> kind = kinds;
   const IndexSpace index = of_cells;
-  for_box("corpuscle::fluid::excess_flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    const unsigned char marks = v.marks(c);
-    if (marks == 0) return;
-    if (marks & VaryingViscosity::face_mark(0)) find_face_excess<0>(v, u, kind, index, c);
-    if (marks & VaryingViscosity::face_mark(1)) find_face_excess<1>(v, u, kind, index, c);
-    if (marks & VaryingViscosity::face_mark(2)) find_face_excess<2>(v, u, kind, index, c);
-  });
-  for_owned("corpuscle::fluid::excess_force", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    if (!(v.marks(c) & VaryingViscosity::cell_mark)) return;
-    Vec3 force;
-    for (int d = 0; d < 3; ++d) {
-      const int next = c + index.stride(d);
-      if (v.marks(c) & VaryingViscosity::face_mark(d)) force -= load(v.excess[d], c);
-      if (v.marks(next) & VaryingViscosity::face_mark(d)) force += load(v.excess[d], next);
-    }
-    store(v.force, c, force);
-  });
+  for_box(
+      "corpuscle::fluid::excess_flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        const unsigned char marks = v.marks(c);
+        if (marks == 0) return;
+        if (marks & VaryingViscosity::face_mark(0)) find_face_excess<0>(v, u, kind, index, c);
+        if (marks & VaryingViscosity::face_mark(1)) find_face_excess<1>(v, u, kind, index, c);
+        if (marks & VaryingViscosity::face_mark(2)) find_face_excess<2>(v, u, kind, index, c);
+      });
+  for_owned(
+      "corpuscle::fluid::excess_force", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        if (!(v.marks(c) & VaryingViscosity::cell_mark)) return;
+        Vec3 force;
+        for (int d = 0; d < 3; ++d) {
+          const int next = c + index.stride(d);
+          if (v.marks(c) & VaryingViscosity::face_mark(d)) force -= load(v.excess[d], c);
+          if (v.marks(next) & VaryingViscosity::face_mark(d)) force += load(v.excess[d], next);
+        }
+        store(v.force, c, force);
+      });
 }
 
 /// image -= v.force of cell c.

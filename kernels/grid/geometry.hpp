@@ -40,21 +40,21 @@ void compute_geometry(const Nodes& node, const GridViews& grid) {
   const auto s0 = grid.face_area[0], s1 = grid.face_area[1], s2 = grid.face_area[2];
   const auto volume = grid.volume;
   constexpr int h = IndexSpace::halo;
-  for_box("corpuscle::grid::geometry", {-h, -h, -h}, {index.n[0] + h, index.n[1] + h, index.n[2] + h},
-          KOKKOS_LAMBDA(int i, int j, int k) {
-            Vec3 p[8];
-            Vec3 centre;
-            for (int m = 0; m < 8; ++m) {
-              p[m] = load(node, at(i + (m & 1), j + ((m >> 1) & 1), k + ((m >> 2) & 1)));
-              centre += p[m];
-            }
-            const int c = index.cell(i, j, k);
-            store(x, c, 0.125 * centre);
-            store(s0, c, 0.5 * cross(p[6] - p[0], p[4] - p[2]));
-            store(s1, c, 0.5 * cross(p[5] - p[0], p[1] - p[4]));
-            store(s2, c, 0.5 * cross(p[3] - p[0], p[2] - p[1]));
-            volume(c) = hexahedron_volume(p);
-          });
+  for_box(
+      "corpuscle::grid::geometry", {-h, -h, -h}, {index.n[0] + h, index.n[1] + h, index.n[2] + h}, KOKKOS_LAMBDA(int i, int j, int k) {
+        Vec3 p[8];
+        Vec3 centre;
+        for (int m = 0; m < 8; ++m) {
+          p[m] = load(node, at(i + (m & 1), j + ((m >> 1) & 1), k + ((m >> 2) & 1)));
+          centre += p[m];
+        }
+        const int c = index.cell(i, j, k);
+        store(x, c, 0.125 * centre);
+        store(s0, c, 0.5 * cross(p[6] - p[0], p[4] - p[2]));
+        store(s1, c, 0.5 * cross(p[5] - p[0], p[1] - p[4]));
+        store(s2, c, 0.5 * cross(p[3] - p[0], p[2] - p[1]));
+        volume(c) = hexahedron_volume(p);
+      });
 }
 
 /// Kind of every node of a block without bodies.
@@ -62,19 +62,18 @@ inline void mark_base_kinds(const GridViews& grid) {
   const IndexSpace index = grid.index;
   const auto kind = grid.base_kind;
   constexpr int h = IndexSpace::halo;
-  for_box("corpuscle::grid::base_kind", {-h, -h, -h}, {index.n[0] + h, index.n[1] + h, index.n[2] + h},
-          KOKKOS_LAMBDA(int i, int j, int k) {
-            const int local[3] = {i, j, k};
-            int beyond = 0;
-            for (int d = 0; d < 3; ++d) {
-              if (index.periodic[d]) continue;
-              const int g = local[d] + index.first[d];
-              const int layers = g < 0 ? -g : (g >= index.global[d] ? g - index.global[d] + 1 : 0);
-              beyond = layers > beyond ? layers : beyond;
-            }
-            kind(index.cell(i, j, k)) =
-                beyond == 0 ? NodeKind::fluid : (beyond == 1 ? NodeKind::boundary : NodeKind::none);
-          });
+  for_box(
+      "corpuscle::grid::base_kind", {-h, -h, -h}, {index.n[0] + h, index.n[1] + h, index.n[2] + h}, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int local[3] = {i, j, k};
+        int beyond = 0;
+        for (int d = 0; d < 3; ++d) {
+          if (index.periodic[d]) continue;
+          const int g = local[d] + index.first[d];
+          const int layers = g < 0 ? -g : (g >= index.global[d] ? g - index.global[d] + 1 : 0);
+          beyond = layers > beyond ? layers : beyond;
+        }
+        kind(index.cell(i, j, k)) = beyond == 0 ? NodeKind::fluid : (beyond == 1 ? NodeKind::boundary : NodeKind::none);
+      });
 }
 
 /// Smallest volume of an owned cell, and where it is (compact cell number).
@@ -85,7 +84,7 @@ inline Kokkos::MinLoc<double, int>::value_type smallest_volume(const GridViews& 
   const auto volume = grid.volume;
   Kokkos::parallel_reduce(
       "corpuscle::grid::smallest_volume", Policy(0, index.owned()),
-      KOKKOS_LAMBDA(int e, Reducer::value_type & least) {
+      KOKKOS_LAMBDA(int e, Reducer::value_type& least) {
         const int i = e % index.n[0], j = (e / index.n[0]) % index.n[1], k = e / (index.n[0] * index.n[1]);
         const double volume_here = volume(index.cell(i, j, k));
         const double v = std::isfinite(volume_here) ? volume_here : -DBL_MAX;  // a node is not a number: worst of all

@@ -17,29 +17,23 @@ namespace corpuscle {
 struct IndexSpace {
   static constexpr int halo = 3;
 
-  int n[3] = {0, 0, 0};        // owned cells
-  int first[3] = {0, 0, 0};    // global index of the first owned cell
-  int global[3] = {0, 0, 0};   // cells of the whole grid
+  int n[3] = {0, 0, 0};       // owned cells
+  int first[3] = {0, 0, 0};   // global index of the first owned cell
+  int global[3] = {0, 0, 0};  // cells of the whole grid
   bool periodic[3] = {false, false, false};
 
   KOKKOS_INLINE_FUNCTION int padded(int d) const { return n[d] + 2 * halo; }
   KOKKOS_INLINE_FUNCTION int size() const { return padded(0) * padded(1) * padded(2); }
   KOKKOS_INLINE_FUNCTION int owned() const { return n[0] * n[1] * n[2]; }
-  KOKKOS_INLINE_FUNCTION int stride(int d) const {
-    return d == 0 ? 1 : (d == 1 ? padded(0) : padded(0) * padded(1));
-  }
+  KOKKOS_INLINE_FUNCTION int stride(int d) const { return d == 0 ? 1 : (d == 1 ? padded(0) : padded(0) * padded(1)); }
   /// Position in a cell view of local cell (i, j, k), each from -halo to n + halo - 1.
-  KOKKOS_INLINE_FUNCTION int cell(int i, int j, int k) const {
-    return (i + halo) + padded(0) * ((j + halo) + padded(1) * (k + halo));
-  }
+  KOKKOS_INLINE_FUNCTION int cell(int i, int j, int k) const { return (i + halo) + padded(0) * ((j + halo) + padded(1) * (k + halo)); }
   KOKKOS_INLINE_FUNCTION void unpack(int c, int& i, int& j, int& k) const {
     i = c % padded(0) - halo;
     j = (c / padded(0)) % padded(1) - halo;
     k = c / (padded(0) * padded(1)) - halo;
   }
-  KOKKOS_INLINE_FUNCTION bool owns(int i, int j, int k) const {
-    return i >= 0 && i < n[0] && j >= 0 && j < n[1] && k >= 0 && k < n[2];
-  }
+  KOKKOS_INLINE_FUNCTION bool owns(int i, int j, int k) const { return i >= 0 && i < n[0] && j >= 0 && j < n[1] && k >= 0 && k < n[2]; }
   /// Compact number of owned cell (i, j, k), 0 to owned() - 1.
   KOKKOS_INLINE_FUNCTION int compact(int i, int j, int k) const { return i + n[0] * (j + n[1] * k); }
   /// visit(i, j, k, more...) for the owned cell whose compact number is e. Every loop over plain numbers comes through here,
@@ -143,8 +137,7 @@ constexpr int worth_threads = 2048;
 /// Run `body(i, j, k)` for one thread's share of the lines of a box, and body.end_line(j, k), if there is one, after each line; or
 /// body.line(begin, end, j, k), if there is that.
 template <class Body>
-void run_lines(const std::array<int, 3>& lower, const std::array<int, 3>& upper, int thread, int threads,
-               const Body& body) {
+void run_lines(const std::array<int, 3>& lower, const std::array<int, 3>& upper, int thread, int threads, const Body& body) {
   const Body cell = body;  // on the stack, where the compiler sees that no store changes what it holds
   const int begin = lower[0], end = upper[0];
   for (LineShare line(lower, upper, thread, threads); line.any(); line.next()) {
@@ -208,12 +201,11 @@ void sum_lines(const std::array<int, 3>& upper, int thread, int threads, const B
 /// Run `body(i, j, k)` for every cell of the box lower <= (i, j, k) < upper. Cells must be independent of each other: on
 /// the host each line of cells along i is a vectorised loop.
 template <class Body>
-void for_box(const std::string& label, const std::array<int, 3>& lower, const std::array<int, 3>& upper,
-             const Body& body) {
+void for_box(const std::string& label, const std::array<int, 3>& lower, const std::array<int, 3>& upper, const Body& body) {
   if (upper[0] <= lower[0] || upper[1] <= lower[1] || upper[2] <= lower[2]) return;
 #if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
-  using Range = Kokkos::MDRangePolicy<Exec, Kokkos::Rank<3, Kokkos::Iterate::Left, Kokkos::Iterate::Left>,
-                                      Kokkos::IndexType<int>, WithLaunch>;
+  using Range =
+      Kokkos::MDRangePolicy<Exec, Kokkos::Rank<3, Kokkos::Iterate::Left, Kokkos::Iterate::Left>, Kokkos::IndexType<int>, WithLaunch>;
   Kokkos::parallel_for(label, Range({lower[0], lower[1], lower[2]}, {upper[0], upper[1], upper[2]}, {32, 4, 2}), body);
 #else
   // One iteration a thread: what a line costs beside its cells is soon as much as the cells of a short one.
@@ -234,7 +226,8 @@ void for_boxes(const std::string& label, const CellBoxes& boxes, const Body& bod
   if (cells == 0) return;
 #if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
   const CellBoxes in = boxes;
-  Kokkos::parallel_for(label, Policy(0, cells), KOKKOS_LAMBDA(int e) { in.visit(e, body); });
+  Kokkos::parallel_for(
+      label, Policy(0, cells), KOKKOS_LAMBDA(int e) { in.visit(e, body); });
 #else
   const int threads = Exec().concurrency();
   const auto share = [=](int thread) CORPUSCLE_INLINE_ALL {
@@ -281,14 +274,11 @@ double sum_owned(const std::string& label, const IndexSpace& index, const Body& 
   double sum = 0;
 #if defined(KOKKOS_ENABLE_CUDA) || defined(KOKKOS_ENABLE_HIP)
   Kokkos::parallel_reduce(
-      label, Policy(0, index.owned()),
-      KOKKOS_LAMBDA(int e, double& total) { total += index.visit_compact(e, body); }, sum);
+      label, Policy(0, index.owned()), KOKKOS_LAMBDA(int e, double& total) { total += index.visit_compact(e, body); }, sum);
 #else
   const std::array<int, 3> upper{index.n[0], index.n[1], index.n[2]};
   const int threads = Exec().concurrency();
-  const auto share = [=](int thread, double& total) CORPUSCLE_INLINE_ALL {
-    total += sum_lines(upper, thread, threads, body);
-  };
+  const auto share = [=](int thread, double& total) CORPUSCLE_INLINE_ALL { total += sum_lines(upper, thread, threads, body); };
   if (index.owned() < worth_threads)
     Kokkos::parallel_reduce(label, Kokkos::RangePolicy<CallingThread>(0, threads), share, sum);
   else

@@ -108,8 +108,7 @@ inline void mark_band(const Lattice& lattice, const NodeBox& within, const Surfa
         const double twice_area = norm(area_normal);
         if (!(twice_area > 0)) return;
         const Vec3 unit = area_normal * (1 / twice_area), centre = (k.a + k.b + k.c) * (1.0 / 3);
-        const double ra = dot(k.a - centre, k.a - centre), rb = dot(k.b - centre, k.b - centre),
-                     rc = dot(k.c - centre, k.c - centre);
+        const double ra = dot(k.a - centre, k.a - centre), rb = dot(k.b - centre, k.b - centre), rc = dot(k.c - centre, k.c - centre);
         const double radius = std::sqrt(ra > rb ? (ra > rc ? ra : rc) : (rb > rc ? rb : rc));
         const double width = around.width;
         const Key farthest = pack_key(width, 0);
@@ -201,31 +200,32 @@ inline void turn_images(const Lattice& lattice, int triangles, const Array<Key>&
   const bool low2 = lattice.boundary_below[2], high2 = lattice.boundary_above[2];
   const std::array<int, 3> lower{lattice.lower[0], lattice.lower[1], lattice.lower[2]},
       upper{lattice.upper[0] + 1, lattice.upper[1] + 1, lattice.upper[2] + 1};
-  for_box("corpuscle::immersed::turn_images", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), at[3] = {i, j, k};
-    if (keys(c) == no_key || index.owns(i, j, k)) return;
-    const unsigned item = key_item(keys(c)), all = static_cast<unsigned>(triangles);
-    const bool beside1 = (low1 && j < 0) || (high1 && j >= index.n[1]), beside2 = (low2 && k < 0) || (high2 && k >= index.n[2]);
-    int image = static_cast<int>(item / all), place = 1;
-    for (int d = 0; d < 3; ++d) {
-      if (!index.periodic[d]) continue;
-      const int global = index.first[d] + at[d], turn = global < 0 ? -1 : (global >= index.global[d] ? 1 : 0);
-      const bool marked_here = (d < 1 && beside1) || (d < 2 && beside2);
-      const int digit = image / place % 3, step = (digit + 1) % 3 - 1 + (marked_here ? 0 : turn);
-      if (step < -1 || step > 1) {
-        keys(c) = no_key;
-        return;
-      }
-      image += ((step + 3) % 3 - digit) * place;
-      place *= 3;
-    }
-    keys(c) = (keys(c) >> 32 << 32) | (static_cast<unsigned>(image) * all + item % all);
-  });
+  for_box(
+      "corpuscle::immersed::turn_images", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k), at[3] = {i, j, k};
+        if (keys(c) == no_key || index.owns(i, j, k)) return;
+        const unsigned item = key_item(keys(c)), all = static_cast<unsigned>(triangles);
+        const bool beside1 = (low1 && j < 0) || (high1 && j >= index.n[1]), beside2 = (low2 && k < 0) || (high2 && k >= index.n[2]);
+        int image = static_cast<int>(item / all), place = 1;
+        for (int d = 0; d < 3; ++d) {
+          if (!index.periodic[d]) continue;
+          const int global = index.first[d] + at[d], turn = global < 0 ? -1 : (global >= index.global[d] ? 1 : 0);
+          const bool marked_here = (d < 1 && beside1) || (d < 2 && beside2);
+          const int digit = image / place % 3, step = (digit + 1) % 3 - 1 + (marked_here ? 0 : turn);
+          if (step < -1 || step > 1) {
+            keys(c) = no_key;
+            return;
+          }
+          image += ((step + 3) % 3 - digit) * place;
+          place *= 3;
+        }
+        keys(c) = (keys(c) >> 32 << 32) | (static_cast<unsigned>(image) * all + item % all);
+      });
 }
 
 /// Closest surface point and signed distance of a node whose closest item is known.
-KOKKOS_INLINE_FUNCTION double signed_foot(const SurfaceSet& s, const PseudoNormals& normals, const Images& images,
-                                          const Vec3& p, unsigned item, Vec3& foot) {
+KOKKOS_INLINE_FUNCTION double signed_foot(const SurfaceSet& s, const PseudoNormals& normals, const Images& images, const Vec3& p,
+                                          unsigned item, Vec3& foot) {
   const int t = static_cast<int>(item % static_cast<unsigned>(s.triangles));
   const Corners k = corners(s, t, images.shift[item / static_cast<unsigned>(s.triangles)]);
   const TrianglePoint at = closest_on_triangle(p, k.a, k.b, k.c);
@@ -239,14 +239,15 @@ inline void measure_band(const Lattice& lattice, const NodeBox& box, const Surfa
                          const PseudoNormals& normals, const BandViews& band) {
   const SurfaceSet s = surface;
   const BandViews b = band;
-  for_box("corpuscle::immersed::measure_band", {box.lower[0], box.lower[1], box.lower[2]},
-          {box.upper[0] + 1, box.upper[1] + 1, box.upper[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
-            const int c = lattice.node(i, j, k);
-            if (b.key(c) == no_key) return;
-            Vec3 foot;
-            b.distance(c) = signed_foot(s, normals, images, lattice.position(c), key_item(b.key(c)), foot);
-            store(b.foot, c, foot);
-          });
+  for_box(
+      "corpuscle::immersed::measure_band", {box.lower[0], box.lower[1], box.lower[2]},
+      {box.upper[0] + 1, box.upper[1] + 1, box.upper[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = lattice.node(i, j, k);
+        if (b.key(c) == no_key) return;
+        Vec3 foot;
+        b.distance(c) = signed_foot(s, normals, images, lattice.position(c), key_item(b.key(c)), foot);
+        store(b.foot, c, foot);
+      });
 }
 
 }  // namespace corpuscle

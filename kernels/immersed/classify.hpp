@@ -12,8 +12,7 @@ namespace corpuscle {
 constexpr NodeKind undecided = static_cast<NodeKind>(5);
 
 /// Kind and body of the nodes of `box` from the signed distance; undecided beyond the band.
-inline void classify_band(const GridViews& grid, const NodeBox& box, const SurfaceSet& s, const BandViews& band,
-                          const NodeViews& nodes) {
+inline void classify_band(const GridViews& grid, const NodeBox& box, const SurfaceSet& s, const BandViews& band, const NodeViews& nodes) {
   const IndexSpace index = grid.index;
   const auto base = grid.base_kind;
   const auto triangle_body = s.triangle_body;
@@ -100,8 +99,7 @@ inline double winding_number(const SurfaceSet& surface, const Images& images, in
 }
 
 /// Outside nodes with a cut link, or an inside neighbour, become immersed.
-inline void mark_immersed(const Lattice& lattice, const NodeBox& box, const SurfaceSet& s, const BandViews& band,
-                          const NodeViews& nodes) {
+inline void mark_immersed(const Lattice& lattice, const NodeBox& box, const SurfaceSet& s, const BandViews& band, const NodeViews& nodes) {
   const auto triangle_body = s.triangle_body;
   const BandViews b = band;
   const NodeViews out = nodes;
@@ -151,8 +149,7 @@ inline int absorb_isolated(const Lattice& lattice, const NodeBox& box, const Sur
           if (b.key(n) == no_key) continue;
           const unsigned item = key_item(b.key(n));
           const int t = static_cast<int>(item % static_cast<unsigned>(s.triangles));
-          const Key offered =
-              offer(p, corners(s, t, images.shift[item / static_cast<unsigned>(s.triangles)]), static_cast<int>(item));
+          const Key offered = offer(p, corners(s, t, images.shift[item / static_cast<unsigned>(s.triangles)]), static_cast<int>(item));
           best = offered < best ? offered : best;
         }
         if (best == no_key) return;
@@ -185,8 +182,7 @@ inline void seed_open_fluid(const IndexSpace& index, const NodeBox& box, const O
         box.unpack(e, i);
         const int c = index.cell(i[0], i[1], i[2]);
         bool open = key(c) == no_key;
-        for (int d = 0; d < 3; ++d)
-          open = open || (i[d] == box.lower[d] && faces.open[d][0]) || (i[d] == box.upper[d] && faces.open[d][1]);
+        for (int d = 0; d < 3; ++d) open = open || (i[d] == box.lower[d] && faces.open[d][0]) || (i[d] == box.upper[d] && faces.open[d][1]);
         reached(c) = open && kind(c) == NodeKind::fluid ? 1 : 0;
       });
 }
@@ -222,8 +218,7 @@ inline void reach_along(const IndexSpace& index, const NodeBox& box, int directi
 }
 
 /// Fluid nodes of the box that have not been reached: owned ones, and all.
-inline Sums<2> count_unreached(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes,
-                               const Array<std::int8_t>& reached) {
+inline Sums<2> count_unreached(const IndexSpace& index, const NodeBox& box, const NodeViews& nodes, const Array<std::int8_t>& reached) {
   const auto kind = nodes.kind;
   Sums<2> unreached;
   Kokkos::parallel_reduce(
@@ -255,8 +250,8 @@ inline long reach_all(const IndexSpace& index, const NodeBox& box, const NodeVie
 
 /// Fluid nodes of the box that have not been reached become immersed: fluid that a surface's folds close in, on the grid,
 /// has no pressure equation that could be solved. @returns how many of them are owned.
-inline int absorb_unreached(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface,
-                            const BandViews& band, const NodeViews& nodes, const Array<std::int8_t>& reached) {
+inline int absorb_unreached(const IndexSpace& index, const NodeBox& box, const SurfaceSet& surface, const BandViews& band,
+                            const NodeViews& nodes, const Array<std::int8_t>& reached) {
   const auto triangle_body = surface.triangle_body;
   const auto key = band.key;
   const NodeViews out = nodes;
@@ -325,8 +320,7 @@ inline void count_nodes(const Lattice& lattice, const NodeBox& box, const BandVi
 }
 
 /// Owned immersed nodes in ascending order; entries beyond the list's extent are dropped. @returns how many there are.
-inline int list_immersed(const IndexSpace& index, const NodeBox& box, const Array<NodeKind>& kind,
-                         const Array<int>& list) {
+inline int list_immersed(const IndexSpace& index, const NodeBox& box, const Array<NodeKind>& kind, const Array<int>& list) {
   return running_sum<int>(
       "corpuscle::immersed::list_immersed", box.size(), KOKKOS_LAMBDA(int e, int& position, bool final) {
         int i[3];

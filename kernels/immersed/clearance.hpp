@@ -8,8 +8,7 @@ namespace corpuscle {
 
 /// How many links from an outside node lead inside without being cut by a triangle. Only where surfaces cross, each other
 /// or themselves: there the side of the closest triangle is not the node's.
-KOKKOS_INLINE_FUNCTION int crossed_links(const Lattice& lattice, const BandViews& band, const Array<NodeKind>& kind,
-                                         int c) {
+KOKKOS_INLINE_FUNCTION int crossed_links(const Lattice& lattice, const BandViews& band, const Array<NodeKind>& kind, int c) {
   constexpr double rounding = 1e-6;  // in links: a node on a surface has no side
   int found = 0;
   for (int side = 0; side < 6; ++side) {
@@ -23,8 +22,8 @@ KOKKOS_INLINE_FUNCTION int crossed_links(const Lattice& lattice, const BandViews
 }
 
 /// Distance of a point to an item of the search, in grid spacings at node i.
-KOKKOS_INLINE_FUNCTION double spacings_to_item(const Lattice& lattice, const int (&i)[3], const SurfaceSet& s,
-                                               const Images& images, const Vec3& from, int item) {
+KOKKOS_INLINE_FUNCTION double spacings_to_item(const Lattice& lattice, const int (&i)[3], const SurfaceSet& s, const Images& images,
+                                               const Vec3& from, int item) {
   const Corners k = corners(s, item % s.triangles, images.shift[item / s.triangles]);
   const TrianglePoint at = closest_on_triangle(from, k.a, k.b, k.c);
   const Vec3 r = at.weight[0] * k.a + at.weight[1] * k.b + at.weight[2] * k.c - from;

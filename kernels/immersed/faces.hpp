@@ -21,8 +21,7 @@ struct FaceViews {
 /// Faces of fluid node i that belong to `body` and of which this rank owns at least one node; calls
 /// `found(cell, direction, sign, immersed)` for each.
 template <class Found>
-KOKKOS_INLINE_FUNCTION void node_faces(const IndexSpace& index, const NodeViews& nodes, const int (&i)[3], int body,
-                                       const Found& found) {
+KOKKOS_INLINE_FUNCTION void node_faces(const IndexSpace& index, const NodeViews& nodes, const int (&i)[3], int body, const Found& found) {
   const int c = index.cell(i[0], i[1], i[2]);
   if (nodes.kind(c) != NodeKind::fluid) return;
   const bool own = index.owns(i[0], i[1], i[2]);
@@ -33,8 +32,7 @@ KOKKOS_INLINE_FUNCTION void node_faces(const IndexSpace& index, const NodeViews&
       beside[d] += step;
       const int other = c + step * stride;
       if (!own && !index.owns(beside[0], beside[1], beside[2])) continue;
-      if (nodes.kind(other) == NodeKind::immersed && nodes.body(other) == body)
-        found(step < 0 ? c : other, d, -step, other);
+      if (nodes.kind(other) == NodeKind::immersed && nodes.body(other) == body) found(step < 0 ? c : other, d, -step, other);
     }
   }
 }
@@ -51,8 +49,7 @@ KOKKOS_INLINE_FUNCTION NodeBox body_box(const IndexSpace& index, const Array<int
 }
 
 /// Fills faces.start. @returns the number of faces.
-inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, const NodeViews& nodes,
-                       const FaceViews& faces) {
+inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, const NodeViews& nodes, const FaceViews& faces) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const auto start = faces.start;
   const NodeViews in = nodes;
@@ -82,8 +79,8 @@ inline int count_faces(const IndexSpace& index, const Array<int>& boxes, int bod
 /// Fills the lists, in ascending order of the fluid node within each body; the lists must be long enough.
 /// @param key        [cell] the search's, at the immersed nodes
 /// @param triangles  of all surfaces
-inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, int triangles,
-                       const NodeViews& nodes, const Array<Key>& key, const FaceViews& faces) {
+inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bodies, int triangles, const NodeViews& nodes,
+                       const Array<Key>& key, const FaceViews& faces) {
   using Team = Kokkos::TeamPolicy<Exec>;
   const FaceViews out = faces;
   const NodeViews in = nodes;
@@ -102,8 +99,8 @@ inline void list_faces(const IndexSpace& index, const Array<int>& boxes, int bod
               out.direction(at) = static_cast<std::int8_t>(d);
               out.sign(at) = static_cast<std::int8_t>(sign);
               out.counted(at) = own ? 1 : 0;
-              out.image(at) = static_cast<std::int8_t>(
-                  key(immersed) == no_key ? 0 : key_item(key(immersed)) / static_cast<unsigned>(triangles));
+              out.image(at) =
+                  static_cast<std::int8_t>(key(immersed) == no_key ? 0 : key_item(key(immersed)) / static_cast<unsigned>(triangles));
               out.body(at) = body;
             }
             ++position;

@@ -7,9 +7,9 @@
 namespace corpuscle {
 
 struct LocateOptions {
-  bool warm = false;        // xi holds the positions of an earlier call
-  bool guarded[6] = {};    // i_min, i_max, ... : sides whose distance is reported
-  bool outflow[6] = {};     // sides whose distance from the first `travellers` vertices is reported
+  bool warm = false;     // xi holds the positions of an earlier call
+  bool guarded[6] = {};  // i_min, i_max, ... : sides whose distance is reported
+  bool outflow[6] = {};  // sides whose distance from the first `travellers` vertices is reported
   int travellers = 0;
   Vec3 lower, upper;        // bounds of the lattice in space, with a margin
   double band_links = 1.1;  // half-width of the band in link lengths
@@ -50,8 +50,8 @@ KOKKOS_INLINE_FUNCTION int nearest_node(const LatticePoint& q, int d) {
 
 /// Fills every member of `places` but the boxes' initial values (see reset_places). A vertex is owned by the rank that
 /// owns the node nearest to it in index space; beyond a physical boundary it is owned by nobody and reported.
-inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const Images& images,
-                            const LocateOptions& options, const PlaceViews& places) {
+inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const Images& images, const LocateOptions& options,
+                            const PlaceViews& places) {
   reset_places(s, places);
   const auto x = s.x;
   const auto body = s.vertex_body;
@@ -62,8 +62,8 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
         for (int m = 0; m < images.count; ++m) {
           const int item = m * vertices + v;
           const Vec3 p = load(x, v) + images.shift[m];
-          const bool far = p.x < options.lower.x || p.x > options.upper.x || p.y < options.lower.y ||
-                           p.y > options.upper.y || p.z < options.lower.z || p.z > options.upper.z;
+          const bool far = p.x < options.lower.x || p.x > options.upper.x || p.y < options.lower.y || p.y > options.upper.y ||
+                           p.z < options.lower.z || p.z > options.upper.z;
           const bool known = options.warm && out.status(item) != Located::failed;
           const bool was_inside = known && out.status(item) == Located::inside;
           if (far) {
@@ -101,8 +101,7 @@ inline void locate_vertices(const Lattice& lattice, const SurfaceSet& s, const I
             out.xi(item, d) = xi[d];
             out.pad(item, d) = pad[d];
             const int nearest = nearest_node(q, d);
-            const bool below = lattice.boundary_below[d] && xi[d] < -1,
-                       above = lattice.boundary_above[d] && xi[d] > lattice.index.n[d];
+            const bool below = lattice.boundary_below[d] && xi[d] < -1, above = lattice.boundary_above[d] && xi[d] > lattice.index.n[d];
             beyond = beyond || below || above;
             beside = beside && xi[d] > lattice.lower[d] - 2 && xi[d] < lattice.upper[d] + 2;
             const bool low = nearest >= 0 || lattice.boundary_below[d];
@@ -150,8 +149,7 @@ inline double smallest_spacing_at(const Lattice& lattice, int vertices, const Pl
         }
         const int c = lattice.node(at[0], at[1], at[2]);
         for (int d = 0; d < 3; ++d) {
-          const double spacing = 0.5 * norm(lattice.position(c + lattice.index.stride(d)) -
-                                            lattice.position(c - lattice.index.stride(d)));
+          const double spacing = 0.5 * norm(lattice.position(c + lattice.index.stride(d)) - lattice.position(c - lattice.index.stride(d)));
           least = smaller(least, spacing);
         }
       },

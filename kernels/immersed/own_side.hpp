@@ -15,8 +15,7 @@ struct SidePoint {
 /// point of its own, with p not behind the surface as q sees it. The second test keeps the far face of another body,
 /// or of a thin fold of the same one, from leaking in. The bounds (cosine of the angle between q's normal and the
 /// direction to p) leave room for the curvature of a convex surface: half for the same body, hardly any for another.
-KOKKOS_INLINE_FUNCTION bool own_side(const Lattice& lattice, const SurfaceSet& s, const BandViews& band,
-                                     const SidePoint& p, int q) {
+KOKKOS_INLINE_FUNCTION bool own_side(const Lattice& lattice, const SurfaceSet& s, const BandViews& band, const SidePoint& p, int q) {
   const Vec3 x = lattice.position(q);
   if (!(dot(x - p.foot, p.normal) > 0)) return false;
   const Key key = band.key(q);

@@ -150,8 +150,7 @@ KOKKOS_INLINE_FUNCTION bool probe(const Allowed& allowed, const ImmersedNode& p,
 }
 
 /// First probe that fits, moving outward from `s` in quarters of a spacing up to `farthest` spacings.
-KOKKOS_INLINE_FUNCTION bool seek_probe(const Allowed& allowed, const ImmersedNode& p, double farthest, double& s,
-                                       LatticeStencil& stencil) {
+KOKKOS_INLINE_FUNCTION bool seek_probe(const Allowed& allowed, const ImmersedNode& p, double farthest, double& s, LatticeStencil& stencil) {
   for (; s <= (farthest + 1e-9) * p.spacing; s += 0.25 * p.spacing) {
     if (probe(allowed, p, s, stencil)) return true;
   }
@@ -278,8 +277,7 @@ struct StencilInput {
   Array<std::int8_t> extended;
 };
 
-KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row& row, RowKind kind,
-                                      const Array<int>& counts, int offset) {
+KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row& row, RowKind kind, const Array<int>& counts, int offset) {
   rows.columns(n) = row.count;
   rows.surface_weight(n) = row.surface;
   rows.kind(n) = kind;
@@ -294,14 +292,14 @@ KOKKOS_INLINE_FUNCTION void write_row(const StencilViews& rows, int n, const Row
 inline void mark_known_pressure(const Array<unsigned char>& given, const Array<std::int8_t>& extended) {
   const auto from = given;
   const auto to = extended;
-  Kokkos::parallel_for("corpuscle::immersed::known_pressure", Policy(0, static_cast<int>(to.extent(0))),
-                       KOKKOS_LAMBDA(int c) { to(c) = from(c) ? 1 : 0; });
+  Kokkos::parallel_for(
+      "corpuscle::immersed::known_pressure", Policy(0, static_cast<int>(to.extent(0))), KOKKOS_LAMBDA(int c) { to(c) = from(c) ? 1 : 0; });
 }
 
 /// Velocity rows and surface points of `count` immersed nodes; counts[0 .. row_kinds) gets the rows of each kind.
 /// Exact for velocities linear in space (quadratic along the normal: for those along straight normals too).
-inline void build_velocity_rows(const StencilInput& input, int count, const StencilViews& rows,
-                                const FootViews& feet, const Array<int>& counts) {
+inline void build_velocity_rows(const StencilInput& input, int count, const StencilViews& rows, const FootViews& feet,
+                                const Array<int>& counts) {
   const StencilInput in = input;
   const StencilViews out = rows;
   const FootViews foot_out = feet;
@@ -324,8 +322,7 @@ inline void build_velocity_rows(const StencilInput& input, int count, const Sten
 
 /// Pressure rows of `count` immersed nodes (fluid nodes only, no surface value); counts[row_kinds .. 2 row_kinds).
 /// Exact for linear pressures. A row of kind surface_only is empty. Sets input.extended at these nodes.
-inline void build_pressure_rows(const StencilInput& input, int count,
-                                const StencilViews& rows, const Array<int>& counts) {
+inline void build_pressure_rows(const StencilInput& input, int count, const StencilViews& rows, const Array<int>& counts) {
   const StencilInput in = input;
   const StencilViews out = rows;
   Kokkos::parallel_for(
@@ -340,8 +337,7 @@ inline void build_pressure_rows(const StencilInput& input, int count,
 }
 
 /// Velocity of the surface at the rows' feet: [row, 3], um/us.
-inline void interpolate_surface_velocity(const SurfaceSet& surface, const FootViews& feet, int count,
-                                         const Components<double>& u_surface) {
+inline void interpolate_surface_velocity(const SurfaceSet& surface, const FootViews& feet, int count, const Components<double>& u_surface) {
   const SurfaceSet s = surface;
   const FootViews in = feet;
   const auto out = u_surface;
@@ -354,8 +350,7 @@ inline void interpolate_surface_velocity(const SurfaceSet& surface, const FootVi
 }
 
 /// Set u at the listed immersed nodes from their rows.
-inline void apply_velocity_rows(const StencilViews& rows, int count, const Components<double>& u_surface,
-                                const Components<double>& u) {
+inline void apply_velocity_rows(const StencilViews& rows, int count, const Components<double>& u_surface, const Components<double>& u) {
   const StencilViews in = rows;
   const auto surface = u_surface, field = u;
   Kokkos::parallel_for(

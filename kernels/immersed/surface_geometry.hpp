@@ -8,9 +8,7 @@
 namespace corpuscle {
 
 /// Half the cross product of two sides: the triangle's area along its normal, um2.
-KOKKOS_INLINE_FUNCTION Vec3 area_vector(const Vec3& a, const Vec3& b, const Vec3& c) {
-  return 0.5 * cross(b - a, c - a);
-}
+KOKKOS_INLINE_FUNCTION Vec3 area_vector(const Vec3& a, const Vec3& b, const Vec3& c) { return 0.5 * cross(b - a, c - a); }
 
 /// Of triangle t of a set.
 KOKKOS_INLINE_FUNCTION Vec3 area_vector(const SurfaceSet& s, int t) {

@@ -26,9 +26,7 @@ struct SurfaceStress {
   }
 };
 
-inline SurfaceStress make_surface_stress(const std::string& label, int vertices) {
-  return {Components<double>(label, vertices, 4)};
-}
+inline SurfaceStress make_surface_stress(const std::string& label, int vertices) { return {Components<double>(label, vertices, 4)}; }
 
 /// Stands for the pressure of a vertex that no fluid node informs. Zero would be a pressure, at whose level the vertex
 /// would be pushed or pulled.
@@ -42,8 +40,7 @@ KOKKOS_INLINE_FUNCTION bool has_pressure(double p) { return !(p >= 0.5 * no_pres
 /// has no force and torque on the body, and does no work while the volume stays.
 /// @param area_vector  area_vector(t): of triangle t, um2
 template <class AreaVector>
-KOKKOS_INLINE_FUNCTION Vec3 pressure_force(const SurfaceSet& s, const SurfaceStress& stress, int i,
-                                           const AreaVector& area_vector) {
+KOKKOS_INLINE_FUNCTION Vec3 pressure_force(const SurfaceSet& s, const SurfaceStress& stress, int i, const AreaVector& area_vector) {
   const double level = stress.pressure(s.first_vertex(s.vertex_body(i))), own = stress.pressure(i) - level;
   Vec3 force;
   for (int r = s.ring_start(i); r < s.ring_start(i + 1); ++r) {
@@ -57,8 +54,7 @@ KOKKOS_INLINE_FUNCTION Vec3 pressure_force(const SurfaceSet& s, const SurfaceStr
 
 /// Force of the fluid on vertex i, nN. Areas as of the last update_surface_geometry().
 KOKKOS_INLINE_FUNCTION Vec3 fluid_force(const SurfaceSet& s, const SurfaceStress& stress, int i) {
-  return s.area(i) * stress.viscous(i) +
-         pressure_force(s, stress, i, [&](int t) { return area_vector(s, t); });
+  return s.area(i) * stress.viscous(i) + pressure_force(s, stress, i, [&](int t) { return area_vector(s, t); });
 }
 
 /// Fills the pressures that are missing in `found` with the mean over the neighbours that have one, or else over the body:

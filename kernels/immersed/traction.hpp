@@ -60,8 +60,7 @@ KOKKOS_INLINE_FUNCTION TractionVertex describe_vertex(const Lattice& lattice, co
 /// Calls use(c, y, r, w) for every node that may inform vertex `t`: c its number, y its index-scaled and r its plain
 /// offset from the vertex, w the weight. `farthest` bounds |y|.
 template <class Use>
-KOKKOS_INLINE_FUNCTION void for_nodes_around(const StencilInput& in, const TractionVertex& t, double farthest,
-                                             const Use& use) {
+KOKKOS_INLINE_FUNCTION void for_nodes_around(const StencilInput& in, const TractionVertex& t, double farthest, const Use& use) {
   int lower[3], upper[3];
   for (int d = 0; d < 3; ++d) {
     lower[d] = static_cast<int>(std::ceil(t.xi[d] - 2.5));
@@ -99,8 +98,8 @@ KOKKOS_INLINE_FUNCTION void fit_basis(const Vec3& y, double (&phi)[N]) {
 /// if its slope along the normal answers a motion of the surface at least as a line to the farthest point would: where all
 /// points lie in a few planes, one that answers less, or with the wrong sign, would drive the surface instead of resisting it.
 template <int N>
-KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
-                                         const Vec3& v, double farthest, Vec3 (&gradient)[3]) {
+KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t, const Vec3& v,
+                                         double farthest, Vec3 (&gradient)[3]) {
   NormalMatrix<N> normal;
   double right[3][N] = {}, answer[N] = {};
   int points = 0;
@@ -128,8 +127,8 @@ KOKKOS_INLINE_FUNCTION bool fit_gradient(const StencilInput& in, const Component
 }
 
 /// Slope along the normal only. @returns false without a point.
-KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<double>& u, const TractionVertex& t,
-                                      const Vec3& v, Vec3 (&gradient)[3]) {
+KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<double>& u, const TractionVertex& t, const Vec3& v,
+                                      Vec3 (&gradient)[3]) {
   double square = 0;
   Vec3 sum;
   for_nodes_around(in, t, 1e3, [&](int c, const Vec3&, const Vec3& r, double w) {
@@ -144,8 +143,8 @@ KOKKOS_INLINE_FUNCTION bool fit_slope(const StencilInput& in, const Components<d
 }
 
 /// Gradient of the velocity in space, gradient[i][j] = du_i/dx_j, and how it was found.
-KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Components<double>& u,
-                                             const TractionVertex& t, const Vec3& v, Vec3 (&gradient)[3]) {
+KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Components<double>& u, const TractionVertex& t, const Vec3& v,
+                                             Vec3 (&gradient)[3]) {
   Vec3 scaled[3];
   int how = traction_fitted;
   if (!fit_gradient<9>(in, u, t, v, fit_radius, scaled)) {
@@ -161,12 +160,12 @@ KOKKOS_INLINE_FUNCTION int velocity_gradient(const StencilInput& in, const Compo
 /// A fit of the pressure. Differences from the first point are fitted: the level of the pressure is not rounded.
 struct PressureFit {
   double value = 0, mean = 0;  // kPa: the fit's at the vertex; weighted average of the points
-  int points = 0, fluid = 0;     // how many; those in the fluid
+  int points = 0, fluid = 0;   // how many; those in the fluid
 };
 
 /// Linear fit of the pressure at the vertex from points up to `farthest`. @returns whether the points carry it
-KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
-                                         double farthest, PressureFit& fit) {
+KOKKOS_INLINE_FUNCTION bool fit_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t, double farthest,
+                                         PressureFit& fit) {
   NormalMatrix<4> normal;
   double right[4] = {0, 0, 0, 0}, level = 0;
   fit.points = fit.fluid = 0;
@@ -201,8 +200,7 @@ KOKKOS_INLINE_FUNCTION bool another_near(const StencilInput& in, const TractionV
   return found;
 }
 
-KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t,
-                                            double& value) {
+KOKKOS_INLINE_FUNCTION int surface_pressure(const StencilInput& in, const Array<double>& p, const TractionVertex& t, double& value) {
   PressureFit fit;
   int how = pressure_fitted;
   const bool fitted = fit_pressure(in, p, t, fit_radius, fit);
@@ -233,8 +231,8 @@ struct TractionInput {
 };
 
 /// Stress of the fluid at the owned vertices, zero at those of other ranks; counts as TractionFallback.
-inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields,
-                      const SurfaceStress& out, const Array<int>& counts) {
+inline void tractions(const StencilInput& input, const PlaceViews& places, const TractionInput& fields, const SurfaceStress& out,
+                      const Array<int>& counts) {
   Kokkos::deep_copy(Exec(), counts, 0);
   const StencilInput in = input;
   const PlaceViews where = places;

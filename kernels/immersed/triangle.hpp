@@ -43,8 +43,8 @@ KOKKOS_INLINE_FUNCTION TrianglePoint closest_on_triangle(const Vec3& p, const Ve
 
 /// Whether segment p, q meets triangle a, b, c. Touching counts, with a margin of round-off, so that a segment through
 /// a shared edge is never missed by both triangles.
-KOKKOS_INLINE_FUNCTION bool segment_meets_triangle(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b,
-                                                   const Vec3& c, const Vec3& area_normal) {
+KOKKOS_INLINE_FUNCTION bool segment_meets_triangle(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c,
+                                                   const Vec3& area_normal) {
   const double sp = dot(p - a, area_normal), sq = dot(q - a, area_normal);
   const Vec3 d = q - p;
   const double length = norm(d), twice_area = norm(area_normal);

@@ -7,8 +7,8 @@ namespace corpuscle {
 
 /// p at owned nodes that were inside and are fluid now: the mean of the neighbours that had a pressure before. What is
 /// stored there is from when the body came.
-inline void fill_uncovered(const Lattice& lattice, const NodeBox& box, const Array<NodeKind>& kind,
-                           const Array<NodeKind>& previous, const Array<double>& p) {
+inline void fill_uncovered(const Lattice& lattice, const NodeBox& box, const Array<NodeKind>& kind, const Array<NodeKind>& previous,
+                           const Array<double>& p) {
   Kokkos::parallel_for(
       "corpuscle::immersed::uncovered_pressure", Policy(0, box.size()), KOKKOS_LAMBDA(int e) {
         int i[3];

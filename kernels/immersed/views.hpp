@@ -71,8 +71,7 @@ struct Corners {
   Vec3 a, b, c;
 };
 KOKKOS_INLINE_FUNCTION Corners corners(const SurfaceSet& s, int t, const Vec3& shift) {
-  return {load(s.x, s.triangle(t, 0)) + shift, load(s.x, s.triangle(t, 1)) + shift,
-          load(s.x, s.triangle(t, 2)) + shift};
+  return {load(s.x, s.triangle(t, 0)) + shift, load(s.x, s.triangle(t, 1)) + shift, load(s.x, s.triangle(t, 2)) + shift};
 }
 
 /// A box of nodes, lower to upper inclusive, flattened with i fastest.

@@ -17,15 +17,14 @@ struct PeriodicFrame {
 /// Move bodies first <= b < last as a whole by periods, so that the mean of each one's vertices lies in the domain.
 /// laps [body, 3] counts the periods taken off since the start. With `from_start` the positions given are without any
 /// taken off, else with those that laps holds. The search of a body that moves begins anew.
-inline void wrap_bodies(const SurfaceSet& set, int first, int last, const PeriodicFrame& frame, bool from_start,
-                        int images, const Array<Located>& status, const Table<int>& laps) {
+inline void wrap_bodies(const SurfaceSet& set, int first, int last, const PeriodicFrame& frame, bool from_start, int images,
+                        const Array<Located>& status, const Table<int>& laps) {
   using Team = Kokkos::TeamPolicy<Exec>::member_type;
   const auto x = set.x;
   const auto first_vertex = set.first_vertex;
   const int vertices = set.vertices;
   Kokkos::parallel_for(
-      "corpuscle::surface::wrap_bodies", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO),
-      KOKKOS_LAMBDA(const Team& team) {
+      "corpuscle::surface::wrap_bodies", Kokkos::TeamPolicy<Exec>(last - first, Kokkos::AUTO), KOKKOS_LAMBDA(const Team& team) {
         const int body = first + team.league_rank(), begin = first_vertex(body), end = first_vertex(body + 1);
         Sums<3> sum;
         Kokkos::parallel_reduce(

@@ -6,8 +6,8 @@
 namespace corpuscle {
 
 /// The first `vertices` rows of x and v into to_x and to_v, all [vertex, 3].
-inline void copy_motion(int vertices, const Components<double>& x, const Components<double>& v,
-                        const Components<double>& to_x, const Components<double>& to_v) {
+inline void copy_motion(int vertices, const Components<double>& x, const Components<double>& v, const Components<double>& to_x,
+                        const Components<double>& to_v) {
   Kokkos::parallel_for(
       "corpuscle::membrane::copy_motion", Policy(0, vertices), KOKKOS_LAMBDA(int i) {
         for (int d = 0; d < 3; ++d) {

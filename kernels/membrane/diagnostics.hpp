@@ -27,8 +27,8 @@ struct CellColumn {
 
 /// Per-triangle sums behind the columns: energies and the first moment of the volume.
 template <class Law>
-KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int type_triangle, const CellLaw& law,
-                                             const Law& in_plane, const Vec3& origin) {
+KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int type_triangle, const CellLaw& law, const Law& in_plane,
+                                             const Vec3& origin) {
   const SurfaceSet& s = m.surface;
   const Components<double>& x = s.x;
   const TriangleRest rest = m.rest(type_triangle);
@@ -40,8 +40,7 @@ KOKKOS_INLINE_FUNCTION Sums<6> triangle_sums(const MembraneViews& m, int t, int 
   Sums<6> sum;
   sum[0] = in_plane.energy(shape, rest);
   for (int k = 0; k < 3; ++k) {
-    const Dihedral angle =
-        dihedral(normal, load(m.triangle_geometry, s.neighbour(t, k)), shape.side[k] * (1 / shape.length[k]));
+    const Dihedral angle = dihedral(normal, load(m.triangle_geometry, s.neighbour(t, k)), shape.side[k] * (1 / shape.length[k]));
     sum[1] += 0.5 * bending_energy(angle, rest.cos_angle[k], rest.sin_angle[k], law.bending);
   }
   const double ratio = area / rest.area;
@@ -61,8 +60,7 @@ void measure_cells(const MembraneViews& m, const Array<Law>& laws, const Cells& 
   using Column = CellColumn;
   const auto x = m.surface.x, v = m.surface.v;
   Kokkos::parallel_for(
-      "corpuscle::membrane::measure_cells", Kokkos::TeamPolicy<Exec>(cells.count, Kokkos::AUTO),
-      KOKKOS_LAMBDA(const SectionTeam& team) {
+      "corpuscle::membrane::measure_cells", Kokkos::TeamPolicy<Exec>(cells.count, Kokkos::AUTO), KOKKOS_LAMBDA(const SectionTeam& team) {
         const int cell = cells(team.league_rank()), type = m.type(cell);
         const CellLaw law = m.law(type);
         const Law in_plane = laws(type);
@@ -95,11 +93,9 @@ void measure_cells(const MembraneViews& m, const Array<Law>& laws, const Cells& 
         Sums<3> lower, upper;
         for (int d = 0; d < 3; ++d) {
           Kokkos::parallel_reduce(
-              Kokkos::TeamThreadRange(team, first, last),
-              [&](int i, double& low) { low = smaller(low, x(i, d)); }, Smallest(lower[d]));
+              Kokkos::TeamThreadRange(team, first, last), [&](int i, double& low) { low = smaller(low, x(i, d)); }, Smallest(lower[d]));
           Kokkos::parallel_reduce(
-              Kokkos::TeamThreadRange(team, first, last),
-              [&](int i, double& high) { high = larger(high, x(i, d)); }, Largest(upper[d]));
+              Kokkos::TeamThreadRange(team, first, last), [&](int i, double& high) { high = larger(high, x(i, d)); }, Largest(upper[d]));
         }
         Kokkos::single(Kokkos::PerTeam(team), [&]() {
           const double area = section_total(m.totals, cell, 0), volume = section_total(m.totals, cell, 1);
@@ -128,9 +124,7 @@ inline double kinetic_energy(const MembraneViews& m) {
   double energy = 0;
   Kokkos::parallel_reduce(
       "corpuscle::membrane::kinetic_energy", Policy(0, m.vertices),
-      KOKKOS_LAMBDA(int i, double& sum) {
-        sum += 0.5 * m.law(m.type(m.surface.vertex_body(i))).vertex_mass * dot(load(v, i), load(v, i));
-      },
+      KOKKOS_LAMBDA(int i, double& sum) { sum += 0.5 * m.law(m.type(m.surface.vertex_body(i))).vertex_mass * dot(load(v, i), load(v, i)); },
       energy);
   return energy;
 }

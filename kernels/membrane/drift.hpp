@@ -36,12 +36,11 @@ inline void project_and_drift(const MembraneViews& m, const MotionViews& w, cons
   for_sections(
       "corpuscle::membrane::project_and_drift", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
         const double factor = -section_total(w.sums, cell, 0) / section_total(w.sums, cell, 1);
-        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
-                             [&](int i) {
-                               const Vec3 velocity = load(v, i) + factor * load(w.direction, i);
-                               store(v, i, velocity);
-                               store(x, i, load(x0, i) + dt * velocity);
-                             });
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
+          const Vec3 velocity = load(v, i) + factor * load(w.direction, i);
+          store(v, i, velocity);
+          store(x, i, load(x0, i) + dt * velocity);
+        });
       });
 }
 
@@ -55,14 +54,12 @@ inline void restore_volume(const MembraneViews& m, const MotionViews& w, double 
         const double wanted = rest - volume;
         const double change = wanted > limit ? limit : (wanted < -limit ? -limit : wanted);
         const double distance = change / section_total(w.sums, cell, 1);
-        if (section == 0)
-          Kokkos::single(Kokkos::PerTeam(team), [&]() { w.volume(cell) = change == wanted ? rest : volume + change; });
-        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
-                             [&](int i) {
-                               const Vec3 position = load(x, i) + distance * load(w.direction, i);
-                               store(x, i, position);
-                               if (!(dot(position, position) < 1e300)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
-                             });
+        if (section == 0) Kokkos::single(Kokkos::PerTeam(team), [&]() { w.volume(cell) = change == wanted ? rest : volume + change; });
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
+          const Vec3 position = load(x, i) + distance * load(w.direction, i);
+          store(x, i, position);
+          if (!(dot(position, position) < 1e300)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
+        });
       });
 }
 
@@ -71,9 +68,7 @@ inline double largest_volume_change(const MembraneViews& m, const MotionViews& w
   double most = 0;
   Kokkos::parallel_reduce(
       "corpuscle::membrane::volume_change", Policy(0, m.cells),
-      KOKKOS_LAMBDA(int cell, double& sum) {
-        sum = larger(sum, std::fabs(section_total(m.totals, cell, 1) / w.volume(cell) - 1));
-      },
+      KOKKOS_LAMBDA(int cell, double& sum) { sum = larger(sum, std::fabs(section_total(m.totals, cell, 1) / w.volume(cell) - 1)); },
       Largest(most));
   return most;
 }

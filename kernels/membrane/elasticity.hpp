@@ -62,9 +62,7 @@ class ElasticityOf final : public Elasticity {
   void evaluate_triangles(const MembraneViews& m, const Components<double>& x) const override {
     corpuscle::evaluate_triangles(m, laws_, cells_within(cells_, listed_, m.first_cell, m.first_cell + m.cells), x);
   }
-  void fill_rows(const MembraneViews& m, const Table<double>& table) const override {
-    corpuscle::measure_cells(m, laws_, cells_, table);
-  }
+  void fill_rows(const MembraneViews& m, const Table<double>& table) const override { corpuscle::measure_cells(m, laws_, cells_, table); }
   void measure_stiffening(const MembraneViews& m, const Array<double>& stiffening) const override {
     corpuscle::measure_stiffening(m, laws_, cells_, stiffening);
   }

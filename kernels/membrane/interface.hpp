@@ -13,7 +13,8 @@ inline void copy_vertices(int count, const Components<double>& from, const Compo
 
 /// The first `count` values, or rows of three, which may be rounded.
 inline void copy_values(int count, const Array<double>& from, const Array<double>& to) {
-  Kokkos::parallel_for("corpuscle::coupling::copy_values", Policy(0, count), KOKKOS_LAMBDA(int i) { to(i) = from(i); });
+  Kokkos::parallel_for(
+      "corpuscle::coupling::copy_values", Policy(0, count), KOKKOS_LAMBDA(int i) { to(i) = from(i); });
 }
 inline void copy_rounded(int count, const Components<double>& from, const Table<float>& to) {
   Kokkos::parallel_for(
@@ -23,8 +24,7 @@ inline void copy_rounded(int count, const Components<double>& from, const Table<
 }
 
 /// w = (x - x_old) / dt: the mean velocity of a step.
-inline void mean_velocity(int count, const Components<double>& x, const Components<double>& x_old, double dt,
-                          const Components<double>& w) {
+inline void mean_velocity(int count, const Components<double>& x, const Components<double>& x_old, double dt, const Components<double>& w) {
   Kokkos::parallel_for(
       "corpuscle::coupling::mean_velocity", Policy(0, count),
       KOKKOS_LAMBDA(int i) { store(w, i, (1 / dt) * (load(x, i) - load(x_old, i))); });
@@ -56,8 +56,8 @@ inline ResidualNorms interface_residual(int count, const Components<double>& ans
 }
 
 /// guess += factor residual; previous = residual.
-inline void relax_interface(int count, double factor, const Components<double>& residual,
-                            const Components<double>& guess, const Components<double>& previous) {
+inline void relax_interface(int count, double factor, const Components<double>& residual, const Components<double>& guess,
+                            const Components<double>& previous) {
   Kokkos::parallel_for(
       "corpuscle::coupling::relax", Policy(0, count), KOKKOS_LAMBDA(int i) {
         const Vec3 r = load(residual, i);

@@ -13,11 +13,11 @@ namespace corpuscle {
 /// Reference data are held once per cell type, with vertices and triangles numbered within the type as within each of
 /// its cells; a cell itself is only positions and velocities.
 struct MembraneViews {
-  int cells = 0, vertices = 0, triangles = 0;  // totals over all cells, or over those of a part
+  int cells = 0, vertices = 0, triangles = 0;                // totals over all cells, or over those of a part
   int first_cell = 0, first_vertex = 0, first_triangle = 0;  // of a part of them: see for_parts()
-  double most_area = 1e300;                    // share by which the area of a membrane that holds it may change
-  double most_volume = 1e300;                  // the same of the volume of any
-  SurfaceSet surface;                          // shared with the fluid; the cells are its first bodies
+  double most_area = 1e300;                                  // share by which the area of a membrane that holds it may change
+  double most_volume = 1e300;                                // the same of the volume of any
+  SurfaceSet surface;                                        // shared with the fluid; the cells are its first bodies
 
   Array<int> type;                 // [cell]
   Array<CellLaw> law;              // [type]

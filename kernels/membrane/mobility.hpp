@@ -7,9 +7,9 @@ namespace corpuscle {
 
 /// Vertices as blobs in an unbounded fluid (Rotne & Prager, J. Chem. Phys. 50, 1969; Yamakawa, ibid. 53, 1970), and each one's slip.
 struct MobilityModel {
-  double viscosity = 1;  // mPa s
-  double radius = 1;     // um, of a blob
-  Components<double> slip[3];  // [vertex, 3] um, columns of what makes slip of force, times viscosity and area; without values none
+  double viscosity = 1;          // mPa s
+  double radius = 1;             // um, of a blob
+  Components<double> slip[3];    // [vertex, 3] um, columns of what makes slip of force, times viscosity and area; without values none
   double dipole = 0, width = 1;  // um: how far the dipoles of forces take the membrane along, and what they are smeared over
 };
 
@@ -44,14 +44,12 @@ inline void take_mode(const Components<double>& values, int cell, int first, int
       },
       total);
   Kokkos::parallel_for(
-      "corpuscle::membrane::mode_sums", Policy(0, sections),
-      KOKKOS_LAMBDA(int s) { w.sums(cell * sections + s, 0) = s == 0 ? total : 0; });
+      "corpuscle::membrane::mode_sums", Policy(0, sections), KOKKOS_LAMBDA(int s) { w.sums(cell * sections + s, 0) = s == 0 ? total : 0; });
 }
 
 /// w.mode = the velocities that the forces w.mode [vertex, 3] give to the vertices of `cell`; w.probe is overwritten, the
 /// squared norm goes to the sums. Normals and areas must be current.
-inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility, int cell, int first, int last,
-                           const StiffnessViews& w) {
+inline void apply_mobility(const MembraneViews& m, const MobilityModel& mobility, int cell, int first, int last, const StiffnessViews& w) {
   const MobilityModel model = mobility;
   const auto x = m.surface.x, normal = m.surface.normal;
   const auto area = m.surface.area;

@@ -19,8 +19,7 @@ struct FluidLoad {
   SurfaceStress stress;
   KOKKOS_INLINE_FUNCTION Vec3 force(const MembraneViews& m, int i, double area) const {
     const auto& geometry = m.triangle_geometry;
-    return area * stress.viscous(i) +
-           pressure_force(m.surface, stress, i, [&](int t) { return geometry(t, 3) * load(geometry, t); });
+    return area * stress.viscous(i) + pressure_force(m.surface, stress, i, [&](int t) { return geometry(t, 3) * load(geometry, t); });
   }
 };
 
@@ -81,15 +80,14 @@ inline void project_and_move(const MembraneViews& m, const MotionViews& w, doubl
         const double wanted = (rest - section_total(m.totals, cell, 1)) / dt;
         const double rate = wanted > limit ? limit : (wanted < -limit ? -limit : wanted);
         const double factor = (rate - section_total(w.sums, cell, 0)) / section_total(w.sums, cell, 1);
-        Kokkos::parallel_for(
-            section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
-              const Vec3 velocity = load(v, i) + factor * load(w.direction, i);
-              const Vec3 position = load(x, i) + dt * velocity;
-              store(v, i, velocity);
-              store(x, i, position);
-              const double size = dot(position, position);
-              if (!(size < 1e300)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
-            });
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
+          const Vec3 velocity = load(v, i) + factor * load(w.direction, i);
+          const Vec3 position = load(x, i) + dt * velocity;
+          store(v, i, velocity);
+          store(x, i, position);
+          const double size = dot(position, position);
+          if (!(size < 1e300)) Kokkos::atomic_fetch_max(&m.status(0), cell + 1);
+        });
       });
 }
 

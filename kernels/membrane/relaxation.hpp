@@ -60,8 +60,7 @@ inline void gather_relaxation(const MembraneViews& m, const RelaxationViews& w) 
 }
 
 /// Steer and move: uphill, stop and shorten the step; downhill, turn the velocity towards the force and lengthen it.
-inline void move_relaxation(const MembraneViews& m, const RelaxationViews& w, const RelaxationLimits& limits,
-                            int iteration) {
+inline void move_relaxation(const MembraneViews& m, const RelaxationViews& w, const RelaxationLimits& limits, int iteration) {
   const auto x = m.surface.x, v = m.surface.v;
   for_sections(
       "corpuscle::membrane::move_relaxation", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
@@ -83,16 +82,15 @@ inline void move_relaxation(const MembraneViews& m, const RelaxationViews& w, co
           mixing = 0.1;
           since = 0;
         }
-        Kokkos::parallel_for(
-            section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
-              const Vec3 f = load(w.force, i);
-              const Vec3 u = keep * load(v, i) + (turn + step) * f;
-              Vec3 move = step * u;
-              const double size = norm(move);
-              if (size > limits.largest_move) move *= limits.largest_move / size;
-              store(v, i, u);
-              store(x, i, load(x, i) + move);
-            });
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section), [&](int i) {
+          const Vec3 f = load(w.force, i);
+          const Vec3 u = keep * load(v, i) + (turn + step) * f;
+          Vec3 move = step * u;
+          const double size = norm(move);
+          if (size > limits.largest_move) move *= limits.largest_move / size;
+          store(v, i, u);
+          store(x, i, load(x, i) + move);
+        });
         if (section == 0) {
           Kokkos::single(Kokkos::PerTeam(team), [&]() {
             w.engine(to, 0) = step;
@@ -118,8 +116,8 @@ inline double largest_force(const MembraneViews& m, const RelaxationViews& w) {
 }
 
 /// Run `count` iterations, numbered on from `first`.
-inline void relax(const MembraneViews& m, const Elasticity& elasticity, const RelaxationViews& w,
-                  const RelaxationLimits& limits, int first, int count) {
+inline void relax(const MembraneViews& m, const Elasticity& elasticity, const RelaxationViews& w, const RelaxationLimits& limits, int first,
+                  int count) {
   for (int i = first; i < first + count; ++i) {
     measure_membranes(m, m.surface.x);
     elasticity.evaluate_triangles(m, m.surface.x);

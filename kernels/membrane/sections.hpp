@@ -40,8 +40,7 @@ struct SectionKernel {
 template <class Cells, class Body>
 void for_sections_of(const std::string& label, const Cells& cells, const Body& body) {
   if (cells.count == 0) return;
-  Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells.count * sections, Kokkos::AUTO),
-                       SectionKernel<Cells, Body>{cells, body});
+  Kokkos::parallel_for(label, Kokkos::TeamPolicy<Exec>(cells.count * sections, Kokkos::AUTO), SectionKernel<Cells, Body>{cells, body});
 }
 
 /// Of every cell.

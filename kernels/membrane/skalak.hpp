@@ -15,8 +15,7 @@ struct SkalakSheet {
   /// B/4 (I1^2/2 + I1 - I2) + C'/8 I2^2: B = 2 G, C' = 2 G C. G is the linear shear modulus, as in the other laws.
   KOKKOS_INLINE_FUNCTION EnergyDensity density(double trace, double ratio) const {
     const double g = shear_modulus, i1 = trace - 2, i2 = ratio * ratio - 1;
-    return {0.25 * g * (i1 * i1 + 2 * (i1 - i2) + area_hardening * i2 * i2), 0.5 * g * (i1 + 1),
-            g * ratio * (area_hardening * i2 - 1)};
+    return {0.25 * g * (i1 * i1 + 2 * (i1 - i2) + area_hardening * i2 * i2), 0.5 * g * (i1 + 1), g * ratio * (area_hardening * i2 - 1)};
   }
   /// Of W's second derivatives by a and by b, the sum over that at rest.
   KOKKOS_INLINE_FUNCTION double stiffening(double trace, double ratio) const {

@@ -38,9 +38,8 @@ inline void displace(const MembraneViews& m, const StiffnessViews& w, double dis
   for_sections(
       "corpuscle::membrane::displace", m.cells, KOKKOS_LAMBDA(const SectionTeam& team, int cell, int section) {
         const double square = section_total(w.sums, cell, 0), factor = square > 0 ? distance / std::sqrt(square) : 0;
-        Kokkos::parallel_for(
-            section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
-            [&](int i) { store(w.probe, i, load(x, i) + factor * load(w.mode, i)); });
+        Kokkos::parallel_for(section_range(team, m.surface.first_vertex(cell), m.surface.first_vertex(cell + 1), section),
+                             [&](int i) { store(w.probe, i, load(x, i) + factor * load(w.mode, i)); });
       });
 }
 
@@ -62,8 +61,8 @@ inline void difference_forces(const MembraneViews& m, const StiffnessViews& w, d
 }
 
 /// Largest eigenvalue for each cell. @param eigenvalue  [cells] nN/um  @param parts  as Elasticity::membrane_forces()
-inline void largest_stiffness(const MembraneViews& m, const Elasticity& elasticity, const StiffnessViews& w,
-                              int iterations, const Array<double>& eigenvalue, const std::vector<CellPart>& parts = {}) {
+inline void largest_stiffness(const MembraneViews& m, const Elasticity& elasticity, const StiffnessViews& w, int iterations,
+                              const Array<double>& eigenvalue, const std::vector<CellPart>& parts = {}) {
   // Small against an edge, large against the rounding of positions: the difference is good to about 1e-6.
   constexpr double distance = 1e-4;
   start_mode(m, w);

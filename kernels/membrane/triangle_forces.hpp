@@ -104,8 +104,7 @@ struct GlobalLoads {
 };
 
 KOKKOS_INLINE_FUNCTION GlobalLoads global_loads(double area, double volume, const CellLaw& law) {
-  return {law.area * (area - law.rest_area) / law.rest_area,
-          -law.volume * (volume - law.rest_volume) / law.rest_volume};
+  return {law.area * (area - law.rest_area) / law.rest_area, -law.volume * (volume - law.rest_volume) / law.rest_volume};
 }
 
 /// Forces on the three corners, nN: the in-plane law's, this triangle's part of the bending of each side, and the area and
@@ -113,8 +112,8 @@ KOKKOS_INLINE_FUNCTION GlobalLoads global_loads(double area, double volume, cons
 /// @param in_plane  see triangle_shape.hpp
 /// @return its strain
 template <class Law>
-KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law,
-                                              const Law& in_plane, const GlobalLoads& loads, Vec3 (&force)[3]) {
+KOKKOS_INLINE_FUNCTION double triangle_forces(const TriangleState& s, const TriangleRest& rest, const CellLaw& law, const Law& in_plane,
+                                              const GlobalLoads& loads, Vec3 (&force)[3]) {
   const TriangleShape shape = triangle_shape(s.corner, s.normal, s.area);
   const double ratio = s.area / rest.area;
   const BendingShare share(ratio);

@@ -16,13 +16,11 @@ struct Symmetric3 {
 KOKKOS_INLINE_FUNCTION Symmetric3 inverse(const Symmetric3& a) {
   const double cxx = a.yy * a.zz - a.yz * a.yz, cxy = a.xz * a.yz - a.xy * a.zz, cxz = a.xy * a.yz - a.xz * a.yy;
   const double f = 1 / (a.xx * cxx + a.xy * cxy + a.xz * cxz);
-  return {f * cxx, f * (a.xx * a.zz - a.xz * a.xz), f * (a.xx * a.yy - a.xy * a.xy), f * cxy,
-          f * cxz, f * (a.xy * a.xz - a.xx * a.yz)};
+  return {f * cxx, f * (a.xx * a.zz - a.xz * a.xz), f * (a.xx * a.yy - a.xy * a.xy), f * cxy, f * cxz, f * (a.xy * a.xz - a.xx * a.yz)};
 }
 
 KOKKOS_INLINE_FUNCTION Vec3 operator*(const Symmetric3& a, const Vec3& b) {
-  return {a.xx * b.x + a.xy * b.y + a.xz * b.z, a.xy * b.x + a.yy * b.y + a.yz * b.z,
-          a.xz * b.x + a.yz * b.y + a.zz * b.z};
+  return {a.xx * b.x + a.xy * b.y + a.xz * b.z, a.xy * b.x + a.yy * b.y + a.yz * b.z, a.xz * b.x + a.yz * b.y + a.zz * b.z};
 }
 
 /// Damping along the edges only: objective, rigid rotation is free.
@@ -43,16 +41,16 @@ struct FullDamping {
 
 /// Work arrays that exist only with membrane viscosity: all but `iterations` hold a part of the cells.
 struct ViscosityViews {
-  RowsFrom<Array<int>> neighbour;              // [ring entry] vertex that it leads to
-  RowsFrom<Array<double>> inverse_length;      // [ring entry] 1/um, of the edge to it
-  RowsFrom<Array<double>> diagonal;            // [vertex] M/dt + beta A, pg/us
-  RowsFrom<Table<double>> block;               // [vertex, 6] inverse of the diagonal 3x3 block; none where the matrix is factorised
-  RowsFrom<Components<double>> right_side;     // [vertex, 3] nN
-  RowsFrom<Components<double>> gradient;       // [vertex, 3] dV/dx, um2
+  RowsFrom<Array<int>> neighbour;           // [ring entry] vertex that it leads to
+  RowsFrom<Array<double>> inverse_length;   // [ring entry] 1/um, of the edge to it
+  RowsFrom<Array<double>> diagonal;         // [vertex] M/dt + beta A, pg/us
+  RowsFrom<Table<double>> block;            // [vertex, 6] inverse of the diagonal 3x3 block; none where the matrix is factorised
+  RowsFrom<Components<double>> right_side;  // [vertex, 3] nN
+  RowsFrom<Components<double>> gradient;    // [vertex, 3] dV/dx, um2
   RowsFrom<Components<double>> residual, search, image;  // [vertex, 3]
-  RowsFrom<Components<double>> inverse_gradient;  // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
-  Array<int> iterations;                       // [cell] of the last velocity solve; negative if it did not converge
-  double times = 1;                            // of D on the left-hand side
+  RowsFrom<Components<double>> inverse_gradient;         // [vertex, 3] the preconditioner times that; of membranes that move with the fluid
+  Array<int> iterations;                                 // [cell] of the last velocity solve; negative if it did not converge
+  double times = 1;                                      // of D on the left-hand side
 };
 
 /// The neighbour that ring entry r of a vertex leads to: the next corner of that triangle.
@@ -207,11 +205,11 @@ template <class Damping>
 struct ViscousSolve : ViscousMatrix<Damping> {
   RowsFrom<Components<double>> right_side;  // [vertex, 3]
   Components<double> solution;              // [vertex, 3] also holds the first guess
-  double tolerance;  // of the residual over the right-hand side, both in the preconditioner's norm
+  double tolerance;                         // of the residual over the right-hand side, both in the preconditioner's norm
   int max_iterations;
 
-  KOKKOS_INLINE_FUNCTION ViscousSolve(const ViscousMatrix<Damping>& matrix, const RowsFrom<Components<double>>& b, const Components<double>& x,
-                                      double share, int most)
+  KOKKOS_INLINE_FUNCTION ViscousSolve(const ViscousMatrix<Damping>& matrix, const RowsFrom<Components<double>>& b,
+                                      const Components<double>& x, double share, int most)
       : ViscousMatrix<Damping>(matrix), right_side(b), solution(x), tolerance(share), max_iterations(most) {}
 
   KOKKOS_INLINE_FUNCTION void operator()(const SectionTeam& team) const {
@@ -248,9 +246,8 @@ struct ViscousSolve : ViscousMatrix<Damping> {
       });
       const double ratio = next / rz;
       rz = next;
-      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last), [&](int i) {
-        store(w.search, i, this->precondition(i, load(w.residual, i)) + ratio * load(w.search, i));
-      });
+      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, first, last),
+                           [&](int i) { store(w.search, i, this->precondition(i, load(w.residual, i)) + ratio * load(w.search, i)); });
       team.team_barrier();
       ++iteration;
     }
@@ -263,7 +260,7 @@ struct ViscousSolve : ViscousMatrix<Damping> {
 /// costs no solve of its own. m.surface.v holds the first guess and the solution.
 template <class Damping>
 struct HeldViscousSolve : ViscousMatrix<Damping> {
-  double tolerance;                     // as ViscousSolve
+  double tolerance;  // as ViscousSolve
   int max_iterations;
 
   KOKKOS_INLINE_FUNCTION HeldViscousSolve(const ViscousMatrix<Damping>& matrix, double share, int most)
@@ -359,8 +356,7 @@ void solve_viscous(const MembraneViews& m, const ViscosityViews& w, const RowsFr
 
 /// The velocity and the answer to a uniform pressure, both with the full left-hand side.
 template <class Damping, class Load>
-void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion, const ViscosityViews& w,
-                              const Load& outside, double dt) {
+void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion, const ViscosityViews& w, const Load& outside, double dt) {
   assemble_viscous<Damping>(m, w, outside, dt);
   solve_viscous<Damping>(m, w, w.gradient, motion.direction);
   solve_viscous<Damping>(m, w, w.right_side, m.surface.v);
@@ -382,8 +378,9 @@ void predict_viscous_velocity(const MembraneViews& m, const MotionViews& motion,
       });
 }
 
-/// The velocity under whatever pressure inside keeps the volume, of a part, after assemble_viscous(). A fluid that cannot be compressed answers to
-/// such a pressure with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps to build up.
+/// The velocity under whatever pressure inside keeps the volume, of a part, after assemble_viscous(). A fluid that cannot be compressed
+/// answers to such a pressure with no velocity at all: left to `beta`, which knows of no such load, it would take eta / (beta area) steps
+/// to build up.
 template <class Damping>
 void solve_held(const MembraneViews& m, const ViscosityViews& w) {
   const HeldViscousSolve<Damping> solve({m, w}, viscous_tolerance, viscous_iterations);
@@ -392,8 +389,8 @@ void solve_held(const MembraneViews& m, const ViscosityViews& w) {
 
 /// damping = D v of a part, which is taken off m.force and, if it is another array, off `force`.
 template <class Damping, class Taken>
-void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v,
-                      const Components<double>& force, const Taken& damping) {
+void subtract_damping(const MembraneViews& m, const ViscosityViews& w, const Components<double>& v, const Components<double>& force,
+                      const Taken& damping) {
   const bool two = force.data() != m.force.data();
   Kokkos::parallel_for(
       "corpuscle::membrane::subtract_damping", Policy(m.first_vertex, m.first_vertex + m.vertices), KOKKOS_LAMBDA(int i) {
@@ -432,7 +429,10 @@ inline double damping_power(const MembraneViews& m, const Components<float>& dam
   double power = 0;
   Kokkos::parallel_reduce(
       "corpuscle::membrane::damping_power", Policy(0, m.vertices),
-      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(Vec3{damping(i, 0), damping(i, 1), damping(i, 2)}, load(v, i)); }, power);
+      KOKKOS_LAMBDA(int i, double& sum) {
+        sum += dot(Vec3{damping(i, 0), damping(i, 1), damping(i, 2)}, load(v, i));
+      },
+      power);
   return power;
 }
 

@@ -7,8 +7,8 @@
 
 namespace corpuscle {
 
-/// Matrices of `teams` cells at a time, each team's in its own row. Blocks of 3 x 3, the lower half: column 3 p + a of the vertex in place p
-/// begins at its own row and has stride() rows, of which the last are beyond the band where a > 0.
+/// Matrices of `teams` cells at a time, each team's in its own row. Blocks of 3 x 3, the lower half: column 3 p + a of the vertex in place
+/// p begins at its own row and has stride() rows, of which the last are beyond the band where a > 0.
 struct ViscousBand {
   int teams = 0;
   int width = 0;             // of the band: largest distance of neighbours' places, of all types

@@ -51,8 +51,8 @@ KOKKOS_INLINE_FUNCTION Crossing cross_triangle(const std::int64_t (&corner)[3][2
     total += weight[k];
   }
   for (int k = 0; k < 3; ++k) crossing.share[k] = static_cast<double>(weight[k]) / static_cast<double>(total);
-  const double beyond_first = crossing.share[1] * static_cast<double>(along[1] - along[0]) +
-                              crossing.share[2] * static_cast<double>(along[2] - along[0]);
+  const double beyond_first =
+      crossing.share[1] * static_cast<double>(along[1] - along[0]) + crossing.share[2] * static_cast<double>(along[2] - along[0]);
   crossing.at = along[0] + static_cast<std::int64_t>(std::floor(beyond_first + 0.5));
   crossing.sign = -turn;  // its normal, which points outward, has the sign of `turn` along d
   return crossing;
@@ -99,8 +99,7 @@ KOKKOS_INLINE_FUNCTION void visit_crossings(const IndexSpace& index, const std::
 KOKKOS_INLINE_FUNCTION bool beyond_block(const IndexSpace& index, const std::int64_t (&corner)[3][3]) {
   for (int d = 0; d < 3; ++d) {
     std::int64_t low = corner[0][d], high = low;
-    for (int k = 1; k < 3; ++k)
-      low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
+    for (int k = 1; k < 3; ++k) low = corner[k][d] < low ? corner[k][d] : low, high = corner[k][d] > high ? corner[k][d] : high;
     if (high < -inside_unit || low > index.n[d] * inside_unit) return true;
   }
   return false;

@@ -17,17 +17,18 @@ inline double face_loss(const GridViews& grid, const Array<NodeKind>& kind, cons
   const auto area0 = grid.face_area[0], area1 = grid.face_area[1], area2 = grid.face_area[2];
   const auto u = velocity;
   const auto p = pressure;
-  return sum_owned("corpuscle::transfer::face_loss", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    double sum = 0;
-    for (int d = 0; d < 3; ++d) {
-      const int low = c - index.stride(d);
-      if (kind(c) != NodeKind::fluid || kind(low) != NodeKind::fluid) continue;
-      const Vec3 area = load(d == 0 ? area0 : (d == 1 ? area1 : area2), c);
-      sum += (through(d, c) - 0.5 * dot(area, load(u, c) + load(u, low))) * (on_faces(d, c) - (p(c) - p(low)));
-    }
-    return sum;
-  });
+  return sum_owned(
+      "corpuscle::transfer::face_loss", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        double sum = 0;
+        for (int d = 0; d < 3; ++d) {
+          const int low = c - index.stride(d);
+          if (kind(c) != NodeKind::fluid || kind(low) != NodeKind::fluid) continue;
+          const Vec3 area = load(d == 0 ? area0 : (d == 1 ? area1 : area2), c);
+          sum += (through(d, c) - 0.5 * dot(area, load(u, c) + load(u, low))) * (on_faces(d, c) - (p(c) - p(low)));
+        }
+        return sum;
+      });
 }
 
 }  // namespace corpuscle

@@ -18,10 +18,10 @@ struct MarkerSearch {
 /// What is remembered of each vertex from one step to the next. Arrays may have room for more.
 struct VertexPlaces {
   int vertices = 0;
-  Table<double> xi;             // [vertex, 3] where it was last found in the lattice
-  Array<unsigned char> known;   // [vertex] 1 if it was, at the last look
-  Array<unsigned char> reach;   // [vertex] 1 if it reaches this rank's faces
-  Array<int> beyond;            // [1] lowest vertex found beyond a side
+  Table<double> xi;            // [vertex, 3] where it was last found in the lattice
+  Array<unsigned char> known;  // [vertex] 1 if it was, at the last look
+  Array<unsigned char> reach;  // [vertex] 1 if it reaches this rank's faces
+  Array<int> beyond;           // [1] lowest vertex found beyond a side
 };
 
 KOKKOS_INLINE_FUNCTION void lattice_to_index(const Lattice& lattice, const LatticePoint& q, double (&eta)[3]) {
@@ -157,8 +157,7 @@ inline int count_at_home(const MarkerViews& markers) {
   const auto home = markers.home;
   int count = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::transfer::count_at_home", Policy(0, markers.count), KOKKOS_LAMBDA(int m, int& sum) { sum += home(m); },
-      count);
+      "corpuscle::transfer::count_at_home", Policy(0, markers.count), KOKKOS_LAMBDA(int m, int& sum) { sum += home(m); }, count);
   return count;
 }
 

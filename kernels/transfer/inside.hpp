@@ -26,7 +26,7 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
                                           const Array<int>& part) {
   const IndexSpace& index = lattice.index;
   constexpr std::int64_t half = inside_unit / 2;
-  visit_crossings(index, corner, d, 0, [&](const Crossing& crossing, const int (&line)[3]) {
+  visit_crossings(index, corner, d, 0, [&](const Crossing& crossing, const int(&line)[3]) {
     std::int64_t from_side = crossing.at + half;  // of the block
     if (lattice.boundary_above[d] && from_side >= index.n[d] * inside_unit) from_side = index.n[d] * inside_unit - 1;
     const std::int64_t cell = floor_units(from_side);
@@ -42,8 +42,8 @@ KOKKOS_INLINE_FUNCTION void add_crossings(const Lattice& lattice, const std::int
 /// Fills `inside` with the changes along each line. A line that comes in through a periodic side is inside as often as,
 /// over all crossings, sign x the periods that they were shifted by along it: a crossing shifted by -1 is of a surface
 /// whose earlier crossings are at the other end. Any sum of integers is the same in any order.
-inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface,
-                            int material, const InsideViews& inside) {
+inline void count_crossings(const MarkerSearch& search, const VertexPlaces& vertex_places, const InsideSurface& surface, int material,
+                            const InsideViews& inside) {
   for (const auto& part : inside.part) Kokkos::deep_copy(Exec(), part, 0);
   const MarkerSearch s = search;
   const VertexPlaces places = vertex_places;
@@ -90,8 +90,7 @@ inline void set_line_starts(const IndexSpace& index, int d, const Array<int>& en
 
 /// From changes to what is inside, along every line. Where no other rank has a part of the lines, all changes of a line
 /// add up to nothing, or it has met a surface that is not closed: broken(0) = 1.
-inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Array<int>& part,
-                          const Array<int>& broken) {
+inline void add_up_inside(const IndexSpace& index, int d, bool alone, const Array<int>& part, const Array<int>& broken) {
   const int n = index.n[d], s = index.stride(d);
   Kokkos::parallel_for(
       "corpuscle::transfer::inside", Policy(0, count_lines(index, d)), KOKKOS_LAMBDA(int line) {

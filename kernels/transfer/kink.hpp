@@ -11,7 +11,7 @@ namespace corpuscle {
 /// A plane membrane moves by `kink` spacings times [du/dn] too fast. With the mean shear e of both sides, [mu] from inside to outside,
 /// [du/dn] = -(f + [mu] e) / mean mu: this is the part of e, as slip is that of f. Rotations have no such shear.
 struct MarkerKink {
-  double way = 0;  // um
+  double way = 0;        // um
   Vec3 normal, dual[3];  // of the grid's tangents at the marker
 
   /// `direction` is where the marker moves with the change of velocity along e: of the row e of the velocity's gradient.
@@ -100,7 +100,9 @@ KOKKOS_INLINE_FUNCTION void changes_of_areas(const TransferBlock& block, const L
   if (block.even) return;
   const bool folded = is_folded<Delta>(block, eta);
   for (int d = 0; d < 3; ++d) {
-    const auto area = [&](int c, const int(&row)[3]) { return Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c); };
+    const auto area = [&](int c, const int(&row)[3]) {
+      return Delta::points > 3 ? seen_area(block, d, c, row) : load(block.sharp_area[d], c);
+    };
     if (folded)
       visit_changes<Delta>(block, eta, d, [&](int c, const double(&w)[3], const int(&row)[3], const int(&)[3]) {
         for (int e = 0; e < 3; ++e) change[d][e] += w[e] * area(c, row);
@@ -210,7 +212,8 @@ void spread_dipoles(const TransferBlock& transfer_block, const MarkerViews& mark
           if (q[0] == 0 && q[1] == 0 && q[2] == 0) return;
           for (int e = 0; e < 3; ++e) {
             const int first = at[e] - point[e], last = index.n[e] - (e == d ? 0 : 1);
-            const bool folded = (block.lattice.boundary_below[e] && first < 0) || (block.lattice.boundary_above[e] && first + points - 1 > last);
+            const bool folded =
+                (block.lattice.boundary_below[e] && first < 0) || (block.lattice.boundary_above[e] && first + points - 1 > last);
             slope[e] = folded ? folded_slope<Delta>(block, e, e == d, MarkerPlace(block.lattice, m, m.order(m.first + row)).eta[e], at[e])
                               : Delta::slope([&](int p) { return m.weight(row, line[e] * points + p); }, point[e]);
           }

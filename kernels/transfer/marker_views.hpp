@@ -12,17 +12,17 @@ namespace corpuscle {
 /// markers of some planes of cells at a time: 180 bytes each, 204 with dipoles.
 struct MarkerViews {
   int count = 0;
-  Array<int> vertex;            // [marker] where it comes from
-  Array<unsigned char> home;    // [marker] 1 for the one marker of a vertex and its copies, of all ranks, that lies in its rank's own cells
-  Table<double> xi;             // [vertex, 3] places in the lattice: VertexPlaces::xi
-  int first = 0, rows = 0;      // those of `order` that have rows
-  Table<short> base;            // [row, 6] first cell, then first face, along each direction that it reaches
-  Table<double> weight;         // [row, 6 points] of those lines of points
-  Table<double> across;         // [row, 3] what its force amounts to as pressure across faces of each direction, kPa
-  Table<double> dipole;         // [row, 3] the same of its changes along each direction, across the faces of one (kink.hpp)
-  Array<int> start;             // [cell + 1] first of `order` in each cell of the block, halo included
-  Array<int> order;             // markers by cell, in each cell in the order of their numbers
-  Array<unsigned char> near;    // [cell] 1 where a marker reaches the cell or its low faces
+  Array<int> vertex;          // [marker] where it comes from
+  Array<unsigned char> home;  // [marker] 1 for the one marker of a vertex and its copies, of all ranks, that lies in its rank's own cells
+  Table<double> xi;           // [vertex, 3] places in the lattice: VertexPlaces::xi
+  int first = 0, rows = 0;    // those of `order` that have rows
+  Table<short> base;          // [row, 6] first cell, then first face, along each direction that it reaches
+  Table<double> weight;       // [row, 6 points] of those lines of points
+  Table<double> across;       // [row, 3] what its force amounts to as pressure across faces of each direction, kPa
+  Table<double> dipole;       // [row, 3] the same of its changes along each direction, across the faces of one (kink.hpp)
+  Array<int> start;           // [cell + 1] first of `order` in each cell of the block, halo included
+  Array<int> order;           // markers by cell, in each cell in the order of their numbers
+  Array<unsigned char> near;  // [cell] 1 where a marker reaches the cell or its low faces
 };
 
 /// The rank's block as markers see it.
@@ -36,9 +36,7 @@ struct TransferBlock {
 
   KOKKOS_INLINE_FUNCTION const IndexSpace& index() const { return lattice.index; }
   /// Number of cells (or faces) along e that belong to this rank.
-  KOKKOS_INLINE_FUNCTION int rows(int e, bool faces) const {
-    return index().n[e] + (faces && lattice.boundary_above[e] ? 1 : 0);
-  }
+  KOKKOS_INLINE_FUNCTION int rows(int e, bool faces) const { return index().n[e] + (faces && lattice.boundary_above[e] ? 1 : 0); }
   KOKKOS_INLINE_FUNCTION bool owns(int e, bool faces, int row) const { return row >= 0 && row < rows(e, faces); }
 };
 
@@ -89,8 +87,7 @@ KOKKOS_INLINE_FUNCTION DeltaLine<Delta> delta_line(const TransferBlock& block, i
     line.row[p] = i;
     line.end[p] = -1;
     if (block.lattice.boundary_below[e] && i < 0) line.row[p] = faces ? -i : -1 - i, line.end[p] = 0;
-    if (block.lattice.boundary_above[e] && i > (faces ? n : n - 1))
-      line.row[p] = faces ? 2 * n - i : 2 * n - 1 - i, line.end[p] = 1;
+    if (block.lattice.boundary_above[e] && i > (faces ? n : n - 1)) line.row[p] = faces ? 2 * n - i : 2 * n - 1 - i, line.end[p] = 1;
   }
   return line;
 }

@@ -31,8 +31,8 @@ KOKKOS_INLINE_FUNCTION void lattice_node(const Lattice& lattice, int number, int
 
 /// The node nearest to a point of those that are some cells away, along a direction of the grid, from all nodes in `others`.
 /// @returns false if there is none near
-KOKKOS_INLINE_FUNCTION bool nearest_node(const NodeBins& bins, const Lattice& lattice, const Vec3& p, const int (*others)[3],
-                                         int count, int (&found)[3]) {
+KOKKOS_INLINE_FUNCTION bool nearest_node(const NodeBins& bins, const Lattice& lattice, const Vec3& p, const int (*others)[3], int count,
+                                         int (&found)[3]) {
   constexpr int apart = 4;  // cells
   const int c[3] = {bins.along(0, p.x), bins.along(1, p.y), bins.along(2, p.z)};
   double best = 1e300;

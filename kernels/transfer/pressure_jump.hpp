@@ -133,7 +133,7 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
         for (int k = 0; k < 3; ++k)
           if (!place_in_units(s, places, surface.triangle(t, k), corner[k])) return;
         if (beyond_block(index, corner)) return;
-        visit_crossings(index, corner, d, 1, [&](const Crossing& crossing, const int (&line)[3]) {
+        visit_crossings(index, corner, d, 1, [&](const Crossing& crossing, const int(&line)[3]) {
           int centre[3] = {line[0], line[1], line[2]};
           centre[d] = static_cast<int>(floor_units(crossing.at + inside_unit / 2));
           const int row = centre[d] + beyond_centre(corner, centre, crossing.sign);
@@ -147,8 +147,7 @@ inline void sum_jumps(const MarkerSearch& search, const VertexPlaces& vertex_pla
 }
 
 /// across += sums / scale at faces of direction d of this rank.
-inline void add_jumps(const IndexSpace& index, int d, const Array<std::int64_t>& sums, double scale,
-                      const Array<double>& across) {
+inline void add_jumps(const IndexSpace& index, int d, const Array<std::int64_t>& sums, double scale, const Array<double>& across) {
   const auto sum = sums;
   const auto to = across;
   const double factor = 1 / scale;

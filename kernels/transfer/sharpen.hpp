@@ -22,8 +22,8 @@ KOKKOS_INLINE_FUNCTION double mirrored(const TransferBlock& block, Sharpen what,
 
 /// sharpen_faces() within a box.
 template <class Raw, class Sharp>
-void sharpen_box(const TransferBlock& transfer_block, Sharpen what, int d, double moment, const Components<double>& u,
-                 const Raw& raw_faces, const Sharp& sharp_faces, const CellBox& box) {
+void sharpen_box(const TransferBlock& transfer_block, Sharpen what, int d, double moment, const Components<double>& u, const Raw& raw_faces,
+                 const Sharp& sharp_faces, const CellBox& box) {
   const TransferBlock block = transfer_block;
   const IndexSpace index = block.index();
   const Raw raw = raw_faces;

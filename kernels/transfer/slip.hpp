@@ -9,11 +9,11 @@ namespace corpuscle {
 /// A force along a plate, smeared over a width across it, moves the plate by c (width) f / mu less than a sharp one, f per
 /// area. The kernel's width across a surface is its spacing along the normal, h_n^2 = the sum of (n . g_d)^2 over the grid's
 /// directions g_d; from faces to cells and back a component along g_d is smeared along it once more, which adds `oblique` times the
-/// square of (n . g_d)^2 / h_n^2 to `coefficient`. Measured on plates at several angles, with spacings of up to 3 to 1, to 0.01 h (four-point: 0.03 h).
-/// Between fluids of viscosities mu and r mu it is their mean that resists, and less is missing, by `layered` times (r - 1)^2 / r, once
-/// the kink of the velocity is taken off (kink.hpp). That and `kink` are measured on a plane across one direction of the grid, as means over
-/// where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50, if slip_between() went on below
-/// what it ends at.
+/// square of (n . g_d)^2 / h_n^2 to `coefficient`. Measured on plates at several angles, with spacings of up to 3 to 1, to 0.01 h
+/// (four-point: 0.03 h). Between fluids of viscosities mu and r mu it is their mean that resists, and less is missing, by `layered` times
+/// (r - 1)^2 / r, once the kink of the velocity is taken off (kink.hpp). That and `kink` are measured on a plane across one direction of
+/// the grid, as means over where it lies, with what two fluids in a cell make of its viscosity: to 0.001 h for r from 1/10 to 50, if
+/// slip_between() went on below what it ends at.
 struct SlipLaw {
   double coefficient, oblique, layered, kink;
 };
@@ -22,11 +22,12 @@ constexpr SlipLaw slip_law() {
   return Delta::points == 3 ? SlipLaw{0.104, 0.28, 0.0415, 0.237} : SlipLaw{0.38, 0.22, 0.0206, 0.358};
 }
 
-/// Slip between two fluids over that in one as viscous as the outer one. What is as short as the kernel's width hardly moves a vertex but by
-/// slip: where none is left, a membrane that resists being strained (by its viscosity, above all) holds the fluid of all that width at rest.
-/// The viscosity that a sphere so held adds, three spacings in radius, jumps from 6 to 30 % too much where slip ends (ratio 4.27). Hence not
-/// less than `least`, by which a plane is too mobile (0.03 h of force per area over the outer viscosity for r = 5): 5 %, and none with five
-/// spacings; blood in a slit, with ratio 5 and 1e-7 N s/m, has 1.37 times the plasma's viscosity on 0.5 um and 1.47 on 1 um (1.44, 1.73 without).
+/// Slip between two fluids over that in one as viscous as the outer one. What is as short as the kernel's width hardly moves a vertex but
+/// by slip: where none is left, a membrane that resists being strained (by its viscosity, above all) holds the fluid of all that width at
+/// rest. The viscosity that a sphere so held adds, three spacings in radius, jumps from 6 to 30 % too much where slip ends (ratio 4.27).
+/// Hence not less than `least`, by which a plane is too mobile (0.03 h of force per area over the outer viscosity for r = 5): 5 %, and none
+/// with five spacings; blood in a slit, with ratio 5 and 1e-7 N s/m, has 1.37 times the plasma's viscosity on 0.5 um and 1.47 on 1 um
+/// (1.44, 1.73 without).
 KOKKOS_INLINE_FUNCTION double slip_between(const SlipLaw& law, double ratio) {
   constexpr double least = 0.2;
   const double slip = 2 * (1 - law.layered / law.coefficient * (ratio - 1) * (ratio - 1) / ratio) / (1 + ratio);
@@ -70,12 +71,12 @@ struct SlipViews {
   double viscosity;          // mPa s, outside
   Components<double> force;  // [vertex, 3] nN, of the membrane on the fluid
   Components<double> normal;
-  Array<double> area;  // [vertex] um2
-  Array<double> gap;   // [vertex] um to the nearest other surface; without values nothing is near
+  Array<double> area;           // [vertex] um2
+  Array<double> gap;            // [vertex] um to the nearest other surface; without values nothing is near
   Components<double> followed;  // [vertex, 1] share of the force that a step can follow; without values all of it
-  Array<int> body;      // [vertex]
-  Array<int> type;      // [body]
-  Array<double> ratio;  // [type] of the viscosity inside to that outside; without values all are 1
+  Array<int> body;              // [vertex]
+  Array<int> type;              // [body]
+  Array<double> ratio;          // [type] of the viscosity inside to that outside; without values all are 1
 
   KOKKOS_INLINE_FUNCTION double ratio_of(int vertex) const { return ratio.extent(0) > 0 ? ratio(type(body(vertex))) : 1; }
 };
@@ -128,8 +129,7 @@ KOKKOS_INLINE_FUNCTION Vec3 fade_at_sides(const TransferBlock& block, const doub
 inline void limit_slip(int vertices, double most, const Array<double>& stiffening) {
   const Array<double> share = stiffening;
   Kokkos::parallel_for(
-      "corpuscle::transfer::limit_slip", Policy(0, vertices),
-      KOKKOS_LAMBDA(int i) { share(i) = share(i) > most ? most / share(i) : 1; });
+      "corpuscle::transfer::limit_slip", Policy(0, vertices), KOKKOS_LAMBDA(int i) { share(i) = share(i) > most ? most / share(i) : 1; });
 }
 
 /// Of a marker's vertex, um/us.

@@ -18,14 +18,13 @@ KOKKOS_INLINE_FUNCTION void visit_faces(const TransferBlock& block, const double
   for (int k = 0; k < Delta::points; ++k)
     for (int j = 0; j < Delta::points; ++j)
       for (int i = 0; i < Delta::points; ++i) {
-        const int row[3] = {line[0].row[i], line[1].row[j], line[2].row[k]},
-                  end[3] = {line[0].end[i], line[1].end[j], line[2].end[k]};
+        const int row[3] = {line[0].row[i], line[1].row[j], line[2].row[k]}, end[3] = {line[0].end[i], line[1].end[j], line[2].end[k]};
         visit(block.index().cell(row[0], row[1], row[2]), line[0].weight[i] * line[1].weight[j] * line[2].weight[k], row, end);
       }
 }
 
-/// Area of the face `c` of direction d as the kernel sees it. Where a marker that reaches this block's first faces reaches a row beyond the halo on
-/// its other side, as the four-point kernel does, that is the line through the last two rows: exact where faces are alike.
+/// Area of the face `c` of direction d as the kernel sees it. Where a marker that reaches this block's first faces reaches a row beyond the
+/// halo on its other side, as the four-point kernel does, that is the line through the last two rows: exact where faces are alike.
 KOKKOS_INLINE_FUNCTION Vec3 seen_area(const TransferBlock& block, int d, int c, const int (&row)[3]) {
   constexpr int halo = IndexSpace::halo;
   const IndexSpace& index = block.index();
@@ -244,7 +243,8 @@ struct SpreadForces {
           const int row = s - m.first;
           double w[6];
           if (!reached(row, 2, k, w[2], w[5]) || !reached(row, 1, j, w[1], w[4])) continue;
-          const int base = m.base(row, 0), face = m.base(row, 3), low = base < face ? base : face, high = (base < face ? face : base) + points;
+          const int base = m.base(row, 0), face = m.base(row, 3), low = base < face ? base : face,
+                    high = (base < face ? face : base) + points;
           const double q[3] = {m.across(row, 0), m.across(row, 1), m.across(row, 2)};
           for (int i = low > begin ? low : begin; i < (high < end ? high : end); ++i) {
             if (!reached(row, 0, i, w[0], w[3])) continue;
@@ -266,8 +266,8 @@ void spread_forces(const TransferBlock& block, const MarkerViews& markers, const
 
 /// Velocity that the sides give, where the face's point is reflected last along `last`: beyond other sides too it is itself
 /// reflected, on from the side along that direction. Exact where the velocity is linear.
-KOKKOS_INLINE_FUNCTION Vec3 given_velocity(const TransferBlock& block, const Components<double>& u, int d, int last,
-                                           const int (&row)[3], const int (&end)[3]) {
+KOKKOS_INLINE_FUNCTION Vec3 given_velocity(const TransferBlock& block, const Components<double>& u, int d, int last, const int (&row)[3],
+                                           const int (&end)[3]) {
   const IndexSpace& index = block.index();
   Vec3 sum;
   for (int on_side = 0; on_side < 8; ++on_side) {  // bit e: the point lies on the side along e
@@ -342,8 +342,7 @@ void interpolate_velocity(const TransferBlock& transfer_block, const Array<doubl
           if (folded)
             visit_faces<Delta>(block, eta, d, [&](int c, double w, const int(&row)[3], const int(&end)[3]) {
               const bool beyond = end[0] >= 0 || end[1] >= 0 || end[2] >= 0;
-              if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2]))
-                return;
+              if (!beyond || !block.owns(0, d == 0, row[0]) || !block.owns(1, d == 1, row[1]) || !block.owns(2, d == 2, row[2])) return;
               sum += w * given_flux(block, u, d, row, end, load(block.sharp_area[d], c));
             });
           part += sum * dual.b[d];

@@ -38,16 +38,15 @@ inline double power_of_pushes(int count, const Array<int>& vertex_body, const Ta
 /// sum += more.
 inline void add_forces(int count, const Components<double>& more, const Components<double>& sum) {
   Kokkos::parallel_for(
-      "corpuscle::transfer::add_forces", Policy(0, count),
-      KOKKOS_LAMBDA(int i) { store(sum, i, load(sum, i) + load(more, i)); });
+      "corpuscle::transfer::add_forces", Policy(0, count), KOKKOS_LAMBDA(int i) { store(sum, i, load(sum, i) + load(more, i)); });
 }
 
 /// Sum of force . velocity, nW.
 inline double power_of(int count, const Components<double>& force, const Components<double>& velocity) {
   double power = 0;
   Kokkos::parallel_reduce(
-      "corpuscle::transfer::power", Policy(0, count),
-      KOKKOS_LAMBDA(int i, double& sum) { sum += dot(load(force, i), load(velocity, i)); }, power);
+      "corpuscle::transfer::power", Policy(0, count), KOKKOS_LAMBDA(int i, double& sum) { sum += dot(load(force, i), load(velocity, i)); },
+      power);
   return power;
 }
 
@@ -55,8 +54,7 @@ inline double power_of(int count, const Components<double>& force, const Compone
 inline void scale_forces(int vertices, double mobility, const Components<double>& force, const Components<double>& velocity) {
   const Components<double> f = force, v = velocity;
   Kokkos::parallel_for(
-      "corpuscle::transfer::scale_forces", Policy(0, vertices),
-      KOKKOS_LAMBDA(int i) { store(v, i, mobility * load(f, i)); });
+      "corpuscle::transfer::scale_forces", Policy(0, vertices), KOKKOS_LAMBDA(int i) { store(v, i, mobility * load(f, i)); });
 }
 
 }  // namespace corpuscle

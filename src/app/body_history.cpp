@@ -13,8 +13,7 @@ namespace corpuscle {
 namespace {
 
 /// Further columns of cells that move in a flow, before those of their shapes.
-const std::vector<std::string> parachute_columns = {"rear_hollow_um", "front_dimple_um", "length_um", "diameter_um",
-                                                "asymmetry"};
+const std::vector<std::string> parachute_columns = {"rear_hollow_um", "front_dimple_um", "length_um", "diameter_um", "asymmetry"};
 /// Further columns of rigid bodies: the force from the fluid's momentum balance, beside that from tractions.
 const std::vector<std::string> balance_columns = {"balance_force_x_nN", "balance_force_y_nN", "balance_force_z_nN"};
 /// And that of cells that touch them.
@@ -22,8 +21,7 @@ const std::vector<std::string> contact_columns = {"contact_force_x_nN", "contact
 
 }  // namespace
 
-BodyHistory::BodyHistory(const std::string& folder, const Case& scene, FlowSimulation& simulation,
-                         std::optional<double> restart_us)
+BodyHistory::BodyHistory(const std::string& folder, const Case& scene, FlowSimulation& simulation, std::optional<double> restart_us)
     : simulation_(simulation) {
   const Comm& comm = simulation.grid().comm();
 #ifdef CORPUSCLE_HDF5
@@ -83,9 +81,7 @@ void BodyHistory::watch_cells(const std::vector<CellDiagnostics>& cells) {
 }
 
 /// z for those that were packed.
-Triple BodyHistory::axis_at_start(int number) const {
-  return number < static_cast<int>(axes_.size()) ? axes_[number] : Triple{0, 0, 1};
-}
+Triple BodyHistory::axis_at_start(int number) const { return number < static_cast<int>(axes_.size()) ? axes_[number] : Triple{0, 0, 1}; }
 
 /// @param travelled  by how much the cell has been moved back through periodic sides, um
 /// @param turned     what CellShapes has found
@@ -105,8 +101,7 @@ HistorySample BodyHistory::cell_sample(int cell, const CellDiagnostics& d, const
   // In a shear that goes past on both sides, and once a flow has come to rest, the way of the cell is but what rounding leaves.
   const double slow = std::max(1e-9, 0.01 * simulation_.fluid().statistics().reference_speed);
   const bool moving = std::hypot(v[0], v[1], v[2]) > slow;
-  const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um,
-                                        moving ? v : axis_at_start(sample.cell));
+  const auto shape = parachute_measures(body_mesh(*simulation_.surfaces(), cell), d.centroid_um, moving ? v : axis_at_start(sample.cell));
   sample.more = {shape.rear_hollow_um, shape.front_dimple_um, shape.length_um, shape.diameter_um, shape.asymmetry};
   sample.more.insert(sample.more.end(), turned.begin(), turned.end());
   return sample;
@@ -214,12 +209,8 @@ CellFigures BodyHistory::cell_figures() {
   const auto travelled = simulation_.coupling()->wrapped_by();
   const auto cells = simulation_.membranes()->diagnostics();
   const auto& names = shapes_->columns();
-  CellFigures figures({{"centroid_um", 3},
-                       {"velocity_um_per_us", 3},
-                       {"extent_um", 3},
-                       {"area_um2", 1},
-                       {"volume_um3", 1},
-                       {"elastic_energy_fJ", 1}});
+  CellFigures figures(
+      {{"centroid_um", 3}, {"velocity_um_per_us", 3}, {"extent_um", 3}, {"area_um2", 1}, {"volume_um3", 1}, {"elastic_energy_fJ", 1}});
   for (const auto& shape : names) figures.add({shape, 1});
   const auto& shapes = measure_shapes();
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -237,6 +228,5 @@ CellFigures BodyHistory::cell_figures() {
   return figures;
 }
 #endif
-
 
 }  // namespace corpuscle

@@ -157,8 +157,7 @@ void print_quantities(const Report& report) {
       return;
     }
     const auto bar = report.error_bars.find(name);
-    info("  {:<34} {:.6g}{}", name, value,
-         bar == report.error_bars.end() ? std::string() : fmt::format(" +- {:.2g}", bar->second));
+    info("  {:<34} {:.6g}{}", name, value, bar == report.error_bars.end() ? std::string() : fmt::format(" +- {:.2g}", bar->second));
   }
 }
 

@@ -3,9 +3,9 @@
 #include "app/any_cell.hpp"
 #include "blood/guided_flow.hpp"
 #include "core/error.hpp"
-#include "membrane/reference.hpp"
 #include "grid/grid.hpp"
 #include "grid/node_file.hpp"
+#include "membrane/reference.hpp"
 
 #include <fmt/format.h>
 
@@ -45,8 +45,7 @@ double mean_spacing(const NodeSource& source, int d) {
 void sample_grid(const GridSettings& settings, SceneSize& size) {
   GridSettings few = settings;
   const double ratio = std::cbrt(sample_cells / (size.cells[0] * size.cells[1] * size.cells[2]));
-  for (int d = 0; d < 3 && ratio < 1; ++d)
-    few.nodes[d] = std::max(std::min(4, few.nodes[d]), 1 + static_cast<int>(ratio * size.cells[d]));
+  for (int d = 0; d < 3 && ratio < 1; ++d) few.nodes[d] = std::max(std::min(4, few.nodes[d]), 1 + static_cast<int>(ratio * size.cells[d]));
   const NodeSource source = make_node_source(few);
   for (int d = 0; d < 3; ++d) size.spacing[d] = mean_spacing(source, d) * source.cells[d] / size.cells[d];
   try {
@@ -97,8 +96,8 @@ double vertices_in_file(const std::string& path) {
 double vertices_of(const BodySettings& body, const SceneSize& size) {
   if (body.shape == BodySettings::Shape::file) return vertices_in_file(body.file);
   if (body.vertices > 0) return body.vertices;
-  const Triple axes = body.shape == BodySettings::Shape::sphere
-                          ? Triple{body.radius_um, body.radius_um, body.radius_um} : body.semi_axes_um;
+  const Triple axes =
+      body.shape == BodySettings::Shape::sphere ? Triple{body.radius_um, body.radius_um, body.radius_um} : body.semi_axes_um;
   const double largest = std::max({axes[0], axes[1], axes[2]});
   const double h2 = std::pow(size.spacing[0] * size.spacing[1] * size.spacing[2], 2.0 / 3);
   return std::clamp(4 * std::acos(-1.0) * largest * largest / (0.87 * h2), 162.0, 100000.0);
@@ -117,9 +116,12 @@ double volume_of(const CellSettings& cell) {
 double reach_of(const CellSettings& cell) {
   if (!cell.mesh.empty()) return 0;
   switch (cell.shape) {
-    case CellSettings::Shape::sphere: return cell.radius_um;
-    case CellSettings::Shape::ellipsoid: return *std::max_element(cell.semi_axes_um.begin(), cell.semi_axes_um.end());
-    default: return 0.5 * cell.diameter_um;
+    case CellSettings::Shape::sphere:
+      return cell.radius_um;
+    case CellSettings::Shape::ellipsoid:
+      return *std::max_element(cell.semi_axes_um.begin(), cell.semi_axes_um.end());
+    default:
+      return 0.5 * cell.diameter_um;
   }
 }
 
@@ -172,8 +174,7 @@ void share_cells(const Case& scene, int ranks, SceneSize& size) {
   const double share = std::ceil(count / ranks);
   double around = 1;  // the volume in which cells are copied or own over the block's
   for (int d = 0; d < 3; ++d)
-    if (size.cut[d] || size.periodic[d])
-      around *= 1 + 2 * ((halo + 1) * size.spacing[d] + reach) / (size.block[d] * size.spacing[d]);
+    if (size.cut[d] || size.periodic[d]) around *= 1 + 2 * ((halo + 1) * size.spacing[d] + reach) / (size.block[d] * size.spacing[d]);
   size.own = all * share / count;
   size.copies = all / count * std::min(share * (around - 1), count * size.images - share);
 }
@@ -205,8 +206,8 @@ double levels_over_finest(const SceneSize& size) {
 void require_below(double count, const char* what, const char* remedy, const char* key = "grid.nodes") {
   constexpr double limit = 2147483647.0;
   if (count <= limit) return;
-  throw InputError(fmt::format("{}: {} would be {:.3g}, and the program counts them up to {:.3g} on a rank: {}", key, what, count,
-                               limit, remedy));
+  throw InputError(
+      fmt::format("{}: {} would be {:.3g}, and the program counts them up to {:.3g} on a rank: {}", key, what, count, limit, remedy));
 }
 
 /// Bytes of a vertex' lists of the triangles within `range`, um, and the skin: four tenths of what membranes have everywhere alike,
@@ -214,7 +215,8 @@ void require_below(double count, const char* what, const char* remedy, const cha
 double of_lists(const SceneSize& size, double range) {
   constexpr double skin = 0.5, apart = 0.4, triangle = 2, body = 72, triangles_of_body = 20;
   const double r = (1 + skin) * range, dense = size.volume > 0 ? 2 * (size.vertices - size.rigid) / size.volume : 0;
-  return std::min(2 * (size.vertices - size.rigid), apart * dense * 4 / 3 * std::acos(-1.0) * r * r * r) * (triangle + body / triangles_of_body);
+  return std::min(2 * (size.vertices - size.rigid), apart * dense * 4 / 3 * std::acos(-1.0) * r * r * r) *
+         (triangle + body / triangles_of_body);
 }
 
 /// Bytes of a vertex, for [contact] and for the look at packed cells' gaps before the first step, of which there is one at a time.
@@ -254,9 +256,7 @@ double of_shared_cells(const Case& scene, const SceneSize& size) {
 
 }  // namespace
 
-double SceneSize::padded() const {
-  return (block[0] + 2 * halo) * (block[1] + 2 * halo) * (block[2] + 2 * halo);
-}
+double SceneSize::padded() const { return (block[0] + 2 * halo) * (block[1] + 2 * halo) * (block[2] + 2 * halo); }
 
 SceneSize measure_scene(const Case& scene, int ranks) {
   SceneSize size;
@@ -282,7 +282,8 @@ double plasma_cells(const Case& scene, const SceneSize& size) {
   if (!scene.blood || !scene.grid || !scene.fluid || scene.fluid->pressure_gradient_Pa_per_um == Triple{} || scene.boundaries.size() != 6)
     return 0;
   std::array<bool, 3> unchanged{};
-  for (const BoundarySettings& side : scene.boundaries) unchanged[static_cast<int>(side.side) / 2] = side.type == BoundarySettings::Type::periodic;
+  for (const BoundarySettings& side : scene.boundaries)
+    unchanged[static_cast<int>(side.side) / 2] = side.type == BoundarySettings::Type::periodic;
   const bool tube = scene.grid->generator == GridSettings::Generator::straight_tube && unchanged[2];
   const bool walls = scene.grid->generator == GridSettings::Generator::box && unchanged != std::array<bool, 3>{true, true, true};
   if (!tube && !walls) return 0;
@@ -298,19 +299,19 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
   const bool convective = scene.fluid && scene.fluid->convection != FluidSettings::Convection::none;
   const double nodes = size.padded(), owned = size.owned();
   // Bytes of each array of a node, of the classes named; doubles are 8, vectors of the cycles 12.
-  const double grid = 24 + 72 + 8 + 1;                                  // Grid: centres, faces, volumes, kinds
+  const double grid = 24 + 72 + 8 + 1;  // Grid: centres, faces, volumes, kinds
   const double solver = 6 * 24 + 4 * 8 + 2 * 3 * 8 + 2 + (convective ? 6 * 8 : 0) + (size.skewed ? 6 * 8 : 0);
-  const double krylov = 5 * 12;                                         // FluidSolver::Momentum
+  const double krylov = 5 * 12;  // FluidSolver::Momentum
   // Transfer: of a kernel that is sharpened twice the faces once more, and other areas on grids that are not uniform.
   const bool sharp = size.shared && scene.coupling->kernel == CouplingSettings::Kernel::three_point;
   const double sharpening = sharp ? 48 + (scene.grid->generator == GridSettings::Generator::box ? 0 : 72) : 0;
   const bool jumps = size.shared && scene.coupling->pressure == CouplingSettings::Pressure::sharp;
-  const double transfer = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : 0;                        // Transfer
-  const double search = transfer + ((size.shared ? size.rigid > 0 : surfaces) ? 51 : 0);            // ImmersedBoundary
+  const double transfer = size.shared ? 29 + sharpening + (jumps ? 8 : 0) : 0;            // Transfer
+  const double search = transfer + ((size.shared ? size.rigid > 0 : surfaces) ? 51 : 0);  // ImmersedBoundary
   const bool ratios = any_cell(scene, [](const CellSettings& c) { return c.viscosity_ratio != 1; });
   const double cytosol = ratios ? 3 * 8 + 3 * 4 + 8 + 4 * 24 + 1 + 12 : 0;  // Cytosol; FluidSolver: smooth, excess, a hierarchy
-  const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);        // hierarchy, velocity's and pressure's cycle
-  const double conjugate_gradients = size.skewed ? 0 : 9 * 8;           // PressureMultigrid
+  const double cycles = 12 + (3 * 4 + 3 * 12) + (3 * 4 + 3 * 4);            // hierarchy, velocity's and pressure's cycle
+  const double conjugate_gradients = size.skewed ? 0 : 9 * 8;               // PressureMultigrid
   const double rows = 19;
   // PressureSolver: values, slots, packed, columns, numbers; hypre's matrix, once more while it takes the values; the
   // vectors of flexible GMRES, two for each of up to 60 iterations.
@@ -321,7 +322,8 @@ MemoryEstimate estimate_memory(const Case& scene, const SceneSize& size, int ran
     mb.fields = (nodes * (grid + solver + krylov + search + cytosol + conjugate_gradients) + owned * (8 + 36)) / bytes_per_mb;
     mb.multigrid = nodes * cycles * levels_over_finest(size) / bytes_per_mb;
     if (size.skewed) mb.pressure_matrix = owned * matrix / bytes_per_mb;
-    mb.output += plasma_cells(scene, size) / ranks * (grid + solver + krylov + conjugate_gradients + 2 * cycles + (size.skewed ? matrix : 0)) / bytes_per_mb;
+    mb.output += plasma_cells(scene, size) / ranks *
+                 (grid + solver + krylov + conjugate_gradients + 2 * cycles + (size.skewed ? matrix : 0)) / bytes_per_mb;
     // A vector of every node in the order of the file, on the device and on the host.
     mb.output += owned * 2 * 24 / bytes_per_mb;
     // A grid from a file: all its nodes, on every rank, while the geometry is made.
@@ -358,16 +360,18 @@ void require_countable(const SceneSize& size, int ranks) {
   if (size.shared) {
     require_below(3 * 2 * (size.own + size.copies), "the corners of triangles", "use more ranks or fewer cells", "cells");
     if (size.writes_cells && size.vertices > 2147483647.0)
-      throw InputError(fmt::format("output.cells: {:.3g} vertices, and cells.h5 numbers them up to 2.15e+09: set output.cells = false, or "
-                                   "use fewer cells or vertices",
-                                   size.vertices));
+      throw InputError(
+          fmt::format("output.cells: {:.3g} vertices, and cells.h5 numbers them up to 2.15e+09: set output.cells = false, or "
+                      "use fewer cells or vertices",
+                      size.vertices));
     return;
   }
   // Triangles are twice the vertices; the search numbers them together with the images under which they are seen.
   if (2 * size.vertices * size.images > 2147483647.0 || 3 * size.vertices > 2147483647.0)
-    throw InputError(fmt::format("cells, bodies: {:.3g} triangles under {:.0f} periodic images are more than the program "
-                                 "counts (2.1e9): use fewer vertices",
-                                 2 * size.vertices, size.images));
+    throw InputError(
+        fmt::format("cells, bodies: {:.3g} triangles under {:.0f} periodic images are more than the program "
+                    "counts (2.1e9): use fewer vertices",
+                    2 * size.vertices, size.images));
 }
 
 MemoryEstimate require_memory(const Comm& comm, const Case& scene) {
@@ -387,12 +391,12 @@ MemoryEstimate require_memory(const Comm& comm, const Case& scene) {
     const double most = comm.max(needed), least = comm.min(at_hand);
     const std::string shared = comm.size() == 1 ? "" : fmt::format(" for {} ranks on one machine", comm.max(neighbours));
     const bool of_cells = estimate.surfaces > 0.5 * estimate.rank();
-    throw InputError(fmt::format(
-        "{} need about {:.3g} GB of memory{}, and {:.3g} GB are at hand: use fewer {}, or {}",
-        of_cells ? fmt::format("cells, bodies: {:.0f} vertices", size.vertices)
-                 : fmt::format("grid.nodes: {:.0f} x {:.0f} x {:.0f} grid cells", size.cells[0], size.cells[1], size.cells[2]),
-        most / 1024, shared, least / 1024, of_cells ? "vertices" : "nodes",
-        comm.size() == 1 ? "ranks on more machines (mpirun)" : "more machines"));
+    throw InputError(
+        fmt::format("{} need about {:.3g} GB of memory{}, and {:.3g} GB are at hand: use fewer {}, or {}",
+                    of_cells ? fmt::format("cells, bodies: {:.0f} vertices", size.vertices)
+                             : fmt::format("grid.nodes: {:.0f} x {:.0f} x {:.0f} grid cells", size.cells[0], size.cells[1], size.cells[2]),
+                    most / 1024, shared, least / 1024, of_cells ? "vertices" : "nodes",
+                    comm.size() == 1 ? "ranks on more machines (mpirun)" : "more machines"));
   }
   require_countable(size, comm.size());
   return estimate;
@@ -408,15 +412,17 @@ double estimate_steps_s(const RunSize& size) {
   // pressure needs a matrix; of a vertex, for search and tractions; of a membrane's vertex in each sub-step.
   const double of_cell = size.skewed ? 1e-5 : 1.1e-6;
   constexpr double of_vertex = 4e-6, of_substep = 2.2e-7;
-  return size.steps / size.cores *
-         (of_cell * size.cells + of_vertex * size.vertices + of_substep * size.substeps * size.membrane_vertices);
+  return size.steps / size.cores * (of_cell * size.cells + of_vertex * size.vertices + of_substep * size.substeps * size.membrane_vertices);
 }
 
 std::string memory_text(const MemoryEstimate& mb, int ranks) {
   std::string parts;
-  for (const auto& [name, value] : {std::pair{"fields", mb.fields}, {"multigrid", mb.multigrid},
-                                    {"pressure matrix", mb.pressure_matrix}, {"surfaces", mb.surfaces},
-                                    {"output", mb.output}, {"program", mb.program}})
+  for (const auto& [name, value] : {std::pair{"fields", mb.fields},
+                                    {"multigrid", mb.multigrid},
+                                    {"pressure matrix", mb.pressure_matrix},
+                                    {"surfaces", mb.surfaces},
+                                    {"output", mb.output},
+                                    {"program", mb.program}})
     if (value >= 0.5) parts += fmt::format("{}{} {:.0f}", parts.empty() ? "" : ", ", name, value);
   return fmt::format("about {:.0f} MB{} ({})", mb.rank() * ranks, ranks > 1 ? fmt::format(" on {} ranks", ranks) : "", parts);
 }

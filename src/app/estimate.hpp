@@ -8,21 +8,21 @@ namespace corpuscle {
 
 /// What the memory of a scene depends on. Counts are numbers of a kind that no case overflows.
 struct SceneSize {
-  std::array<double, 3> cells{};     // of the whole grid; zero without one
-  std::array<double, 3> block{};     // of the largest rank
-  std::array<double, 3> spacing{};   // mean, um, along each index direction
+  std::array<double, 3> cells{};    // of the whole grid; zero without one
+  std::array<double, 3> block{};    // of the largest rank
+  std::array<double, 3> spacing{};  // mean, um, along each index direction
   std::array<bool, 3> periodic{}, cut{};
-  bool skewed = false;               // the pressure equation needs a matrix
-  bool sampled = true;               // skewness and spacing are the grid's; false: of a file that was not read
-  double volume = 0;                 // um3, about; 0 where the grid was not sampled
-  double vertices = 0;               // of all surfaces
-  double rigid = 0;                  // of them, those of rigid bodies, which every rank has
-  double images = 1;                 // under which each surface is seen: 3 for every periodic direction
-  double pairs = 0;                  // of the vertices of a cell, over the types of cells that move with the fluid
-  double cells_listed = 0;           // cells of the whole scene
-  bool shared = false;               // cells are shared out over ranks: coupling.scheme = "force"
-  bool writes_cells = false;         // cells.h5
-  double own = 0, copies = 0;        // vertices that a rank holds, of its own cells and of copies of others; all without sharing
+  bool skewed = false;         // the pressure equation needs a matrix
+  bool sampled = true;         // skewness and spacing are the grid's; false: of a file that was not read
+  double volume = 0;           // um3, about; 0 where the grid was not sampled
+  double vertices = 0;         // of all surfaces
+  double rigid = 0;            // of them, those of rigid bodies, which every rank has
+  double images = 1;           // under which each surface is seen: 3 for every periodic direction
+  double pairs = 0;            // of the vertices of a cell, over the types of cells that move with the fluid
+  double cells_listed = 0;     // cells of the whole scene
+  bool shared = false;         // cells are shared out over ranks: coupling.scheme = "force"
+  bool writes_cells = false;   // cells.h5
+  double own = 0, copies = 0;  // vertices that a rank holds, of its own cells and of copies of others; all without sharing
 
   double owned() const { return block[0] * block[1] * block[2]; }
   /// With the halo.
@@ -56,7 +56,7 @@ MemoryEstimate require_memory(const Comm& comm, const Case& scene);
 
 /// What the time of a run depends on, beyond how long its set-up takes.
 struct RunSize {
-  double cells = 0;     // of the grid
+  double cells = 0;  // of the grid
   bool skewed = false;
   double vertices = 0;  // of all surfaces
   double membrane_vertices = 0, substeps = 1;

@@ -38,10 +38,12 @@ constexpr FigureLevel levels[] = {
     // 0.05 to 0.11 where the drag is right within 1 %, 0.16 to 0.33 where it is off by 1.4 to 12 %. Past a sphere in
     // a periodic box 0.23, 0.13 and 0.09 with 7, 10 and 13 nodes a diameter, where the drag is 2.5, 1.3 and 0.6 % high.
     {"slip", 0.15, false, Of::speed, "grid.nodes",
-     "the flow does not follow the surfaces, by that share of the largest speed on average: refine grid.nodes, forces and shapes are not resolved"},
+     "the flow does not follow the surfaces, by that share of the largest speed on average: refine grid.nodes, forces and shapes are not "
+     "resolved"},
     // Between two surfaces the drag is off by 6 % with a gap of 3.4 spacings, by 12 % with 2.4.
     {"least_wall_spacings", 2, true, Of::itself, "grid.nodes",
-     "so few grid spacings between a surface and a wall, an inlet or a symmetry side do not resolve the flow between them: refine grid.nodes"},
+     "so few grid spacings between a surface and a wall, an inlet or a symmetry side do not resolve the flow between them: refine "
+     "grid.nodes"},
     {"least_body_spacings", 2, true, Of::itself, "grid.nodes",
      "so few grid spacings between two surfaces do not resolve the film between them: refine grid.nodes"},
     // Each was put back, at the cost of a push that no force of the model makes.
@@ -55,12 +57,15 @@ constexpr FigureLevel levels[] = {
     {"volume_drift", 1e-4, false, Of::flow, "time.step_us", "a cell has lost or gained volume: reduce time.step_us"},
     // Evans, Waugh and Melnik, Biophys. J. 16, 1976.
     {"area_drift", 0.04, false, Of::itself, "cells.0.area_modulus_uN_per_m",
-     "a real membrane breaks at about 4 % of area, so this load (or how far a cell starts drawn out, start_stretch) is beyond the model, or what a "
-     "step (time.step_us) brings is more than membranes follow: compare with a shorter one, reduce the flow or force, widen the channel, or check cells.0.area_modulus_uN_per_m"},
+     "a real membrane breaks at about 4 % of area, so this load (or how far a cell starts drawn out, start_stretch) is beyond the model, "
+     "or what a "
+     "step (time.step_us) brings is more than membranes follow: compare with a shorter one, reduce the flow or force, widen the channel, "
+     "or check cells.0.area_modulus_uN_per_m"},
     // 0.03 in the tube. Above, most of a membrane's velocity is new in each step: it swings.
     {"coupling_residual", 0.5, false, Of::speed, "time.step_us",
      "the velocity of the membrane changes by that share of itself in a step, on average: leave out or lower "
-     "coupling.robin_coefficient_pg_per_um2_per_us if it is set, reduce time.step_us, set time.first_step_us, or use coupling.scheme = \"iterated\""},
+     "coupling.robin_coefficient_pg_per_um2_per_us if it is set, reduce time.step_us, set time.first_step_us, or use coupling.scheme = "
+     "\"iterated\""},
     // 0.001 to 0.04 in good runs, 0.2 where a cell is set in motion and little is dissipated (20 us of uniform flow); work that
     // is not accounted for is an error of the forces.
     {"energy_balance", 0.3, false, Of::energy, "time.step_us",
@@ -76,7 +81,8 @@ constexpr FigureLevel levels[] = {
      "that share of the work between fluid and membranes is not accounted for: reduce time.step_us or refine grid.nodes"},
     // Nothing in good runs. 2 in a pack that starts pressed by an aggregation of 2 uN/m, in steps of 0.2 us at first; 0.3 in steps of 0.05.
     {"membrane_drive", 0.1, false, Of::any_energy, "time.first_step_us",
-     "membrane viscosity, which can only resist, has driven the flow by that share of the largest work: it follows loads that change within "
+     "membrane viscosity, which can only resist, has driven the flow by that share of the largest work: it follows loads that change "
+     "within "
      "a few steps late: reduce time.first_step_us and time.step_us, or start cells farther from each other than contact.range_um"},
     // The error that leaving it out makes is of this order.
     {"convection_over_viscosity", 0.05, false, Of::left_out_convection, "fluid.convection",
@@ -100,15 +106,24 @@ constexpr double thermal_noise = 4e-4;  // fJ, a hundred times k T: less work th
 
 bool applies(Of of, const FigureScales& scales) {
   switch (of) {
-    case Of::flow: return !scales.stretching;
-    case Of::stretching: return scales.stretching;
-    case Of::speed: return !(scales.speed_um_per_us <= speed_at_rest);
-    case Of::any_energy: return !(scales.energy_fJ <= thermal_noise);
-    case Of::energy: return !scales.forces && !(scales.energy_fJ <= thermal_noise);
-    case Of::energy_with_forces: return scales.forces && !scales.contact && !(scales.energy_fJ <= thermal_noise);
-    case Of::energy_with_contact: return scales.forces && scales.contact && !(scales.energy_fJ <= thermal_noise);
-    case Of::left_out_convection: return scales.convection_left_out;
-    default: return true;
+    case Of::flow:
+      return !scales.stretching;
+    case Of::stretching:
+      return scales.stretching;
+    case Of::speed:
+      return !(scales.speed_um_per_us <= speed_at_rest);
+    case Of::any_energy:
+      return !(scales.energy_fJ <= thermal_noise);
+    case Of::energy:
+      return !scales.forces && !(scales.energy_fJ <= thermal_noise);
+    case Of::energy_with_forces:
+      return scales.forces && !scales.contact && !(scales.energy_fJ <= thermal_noise);
+    case Of::energy_with_contact:
+      return scales.forces && scales.contact && !(scales.energy_fJ <= thermal_noise);
+    case Of::left_out_convection:
+      return scales.convection_left_out;
+    default:
+      return true;
   }
 }
 
@@ -121,7 +136,10 @@ nlohmann::json judge(const nlohmann::json& errors, const FigureScales& scales) {
     if (found == errors.end() || !found->is_number() || !applies(of, scales)) continue;
     const double value = found->get<double>();
     if (least ? value >= level : value <= level) continue;  // not a number is neither
-    warnings.push_back({{"figure", figure}, {"value", value}, {"level", level}, {"key", key},
+    warnings.push_back({{"figure", figure},
+                        {"value", value},
+                        {"level", level},
+                        {"key", key},
                         {"message", fmt::format("{} = {:.3g}, {} than {:g}: {}", figure, value, least ? "less" : "more", level, message)}});
   }
   return warnings;

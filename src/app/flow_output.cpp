@@ -17,15 +17,17 @@ namespace corpuscle {
 namespace {
 
 #ifdef CORPUSCLE_HDF5
-std::vector<std::int32_t> to_int32(const HostMirror<Table<int>>& host) {
-  return {host.data(), host.data() + host.span()};
-}
+std::vector<std::int32_t> to_int32(const HostMirror<Table<int>>& host) { return {host.data(), host.data() + host.span()}; }
 #endif
 
 #ifdef CORPUSCLE_HDF5
 SurfaceShare share_of(const SharedCells& cells) {
-  return {static_cast<hsize_t>(cells.total_vertices()), static_cast<hsize_t>(cells.total_triangles()),
-          static_cast<hsize_t>(cells.total()), vertex_rows(cells), triangle_rows(cells), cell_rows(cells)};
+  return {static_cast<hsize_t>(cells.total_vertices()),
+          static_cast<hsize_t>(cells.total_triangles()),
+          static_cast<hsize_t>(cells.total()),
+          vertex_rows(cells),
+          triangle_rows(cells),
+          cell_rows(cells)};
 }
 
 /// Of surfaces that every rank has.
@@ -55,10 +57,16 @@ std::unique_ptr<CellWriter> make_shared_writer(const std::string& folder, const 
 
 }  // namespace
 
-FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers,
-                       std::optional<double> restart_us, std::chrono::steady_clock::time_point start)
-    : folder_(place.folder), run_(place.run), files_(place.files), scene_(std::move(scene)), simulation_(simulation),
-      timers_(timers), start_(start), energy_(simulation) {
+FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers, std::optional<double> restart_us,
+                       std::chrono::steady_clock::time_point start)
+    : folder_(place.folder),
+      run_(place.run),
+      files_(place.files),
+      scene_(std::move(scene)),
+      simulation_(simulation),
+      timers_(timers),
+      start_(start),
+      energy_(simulation) {
   const Comm& comm = simulation.grid().comm();
   if (simulation.coupling()) history_ = std::make_unique<BodyHistory>(folder_, scene_, simulation, restart_us);
   // Nothing on a rank grows with the number of all cells.
@@ -69,8 +77,7 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
   }
 #ifdef CORPUSCLE_HDF5
   if (scene_.output.fields)
-    fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(),
-                                            simulation.grid().owned_nodes().data(), restart_us);
+    fields_ = std::make_unique<FieldWriter>(folder_, comm, simulation.grid().index(), simulation.grid().owned_nodes().data(), restart_us);
   if (scene_.output.cells && simulation.shared_cells()) {
     cells_ = make_shared_writer(folder_, comm, *simulation.shared_cells(), restart_us);
     if (simulation.immersed()) bodies_ = make_writer(folder_, comm, simulation.immersed()->surfaces(), "bodies", restart_us);
@@ -81,9 +88,7 @@ FlowOutput::FlowOutput(const Place& place, Case scene, FlowSimulation& simulatio
 }
 
 /// Whether it is that, or the last.
-bool FlowOutput::due(double every_us) const {
-  return simulation_.done() || simulation_.at_outflow() || passed(every_us);
-}
+bool FlowOutput::due(double every_us) const { return simulation_.done() || simulation_.at_outflow() || passed(every_us); }
 
 /// Whether it is the first at or after a multiple of `every_us`.
 bool FlowOutput::passed(double every_us) const {
@@ -182,8 +187,7 @@ void FlowOutput::write_fields() {
     fields.push_back({"wall_shear_stress_Pa", 3, stress.data()});
   }
   if (scene_.output.kind) {
-    for (auto value : box_integers(index, owned, simulation_.fluid().kind()))
-      kind.push_back(static_cast<std::int8_t>(value));
+    for (auto value : box_integers(index, owned, simulation_.fluid().kind())) kind.push_back(static_cast<std::int8_t>(value));
     labels.push_back({"kind", kind.data()});
   }
   fields_->write(simulation_.time(), simulation_.steps(), fields, labels);
@@ -307,7 +311,8 @@ void FlowOutput::fill_blood(Report& report, const ContactReport& contact) const 
 void FlowOutput::fill_blood_quantities(Report& report) const {
   if (!blood_) return;
   const auto& block = report.extra["blood"];
-  for (const char* name : {"mean_speed_mm_per_s", "cell_speed_mm_per_s", "discharge_hematocrit", "relative_apparent_viscosity", "cell_free_layer_um"})
+  for (const char* name :
+       {"mean_speed_mm_per_s", "cell_speed_mm_per_s", "discharge_hematocrit", "relative_apparent_viscosity", "cell_free_layer_um"})
     if (block.contains(name)) report.quantities[std::string("blood_") + name] = block[name];
 }
 

@@ -20,8 +20,8 @@ class FlowOutput {
  public:
   /// @param restart_us  time of the checkpoint that the run continues from: files up to it are kept
   /// @param start       when the program began this run
-  FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers,
-             std::optional<double> restart_us, std::chrono::steady_clock::time_point start);
+  FlowOutput(const Place& place, Case scene, FlowSimulation& simulation, Timers& timers, std::optional<double> restart_us,
+             std::chrono::steady_clock::time_point start);
 
   /// After every step (and before the first, with `start`): whatever is due.
   /// @throws ComputationError  when a file cannot be written
@@ -75,8 +75,8 @@ class FlowOutput {
   std::unique_ptr<BloodSampler> blood_;
   std::unique_ptr<BloodFiles> blood_files_;
   Components<double> wall_stress_;
-  RunTotals totals_;  // `energy`, `immersed` and the times: only of the runs before this one
-  std::optional<FlowSample> end_sample_;  // of the last step, where it is none of the regular ones
+  RunTotals totals_;                                // `energy`, `immersed` and the times: only of the runs before this one
+  std::optional<FlowSample> end_sample_;            // of the last step, where it is none of the regular ones
   std::optional<EnergyBalance::State> end_energy_;  // the same
   std::chrono::steady_clock::time_point start_;
   EnergyBalance energy_;

@@ -29,8 +29,7 @@ void report_energy(const FlowRecord& record, Report& report) {
   if (const auto whole = energy.imbalance()) report.errors["energy_balance"] = *whole;
   const auto& t = energy.totals();
   auto& terms = report.extra["energy_fJ"];
-  terms = {{"boundaries", t.boundaries}, {"pressure_gradient", t.gradient}, {"dissipation", t.dissipation},
-           {"kinetic", t.kinetic}};
+  terms = {{"boundaries", t.boundaries}, {"pressure_gradient", t.gradient}, {"dissipation", t.dissipation}, {"kinetic", t.kinetic}};
   if (simulation.rigid_bodies()) terms["on_bodies"] = t.on_bodies;
   if (!simulation.membranes()) return;
   if (const auto own = energy.coupling_imbalance()) report.errors["energy_balance_coupling"] = *own;
@@ -97,7 +96,8 @@ void report_search(FlowSimulation& simulation, const RunTotals& now, Report& rep
 void report_contact(FlowSimulation& simulation, const RunTotals& now, Report& report) {
   if (!simulation.coupling() || !simulation.coupling()->contact_report()) return;
   report.errors["crossings"] = now.contact.crossings;
-  report.extra["contact"] = {{"crossings", now.contact.crossings}, {"limited_approaches", now.contact.limited}, {"lists", now.contact.lists}};
+  report.extra["contact"] = {
+      {"crossings", now.contact.crossings}, {"limited_approaches", now.contact.limited}, {"lists", now.contact.lists}};
   for (const auto& [name, gap] : {std::pair{"smallest_gap_um", now.contact.smallest()},
                                   {"smallest_gap_between_cells_um", now.contact.smallest_gap},
                                   {"smallest_gap_within_cells_um", now.contact.smallest_own_gap},
@@ -153,8 +153,7 @@ void report_totals(const FlowRecord& record, const RunTotals& now, Report& repor
   report.projections = now.projections;
   report.coupling_iterations = now.coupling;
   report.membrane_substeps = now.substeps;
-  report.extra["cells"] = {simulation.grid().index().global[0], simulation.grid().index().global[1],
-                           simulation.grid().index().global[2]};
+  report.extra["cells"] = {simulation.grid().index().global[0], simulation.grid().index().global[1], simulation.grid().index().global[2]};
   report.wall_s = now.wall_s;
   report.wall_s_by_part = now.wall_s_by_part;
   report.steps = simulation.steps();

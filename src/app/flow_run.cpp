@@ -1,16 +1,16 @@
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
+#include "app/packing_text.hpp"
 #include "app/scene_runs.hpp"
 #include "app/stop_signal.hpp"
 #include "app/waiting.hpp"
-#include "app/packing_text.hpp"
 #include "core/error.hpp"
 #include "core/log.hpp"
 #include "coupling/restart.hpp"
 #include "output/on_root.hpp"
-#include "populations/populations.hpp"
 #include "parallel/agree.hpp"
 #include "parallel/traffic.hpp"
+#include "populations/populations.hpp"
 
 #include <fmt/ranges.h>
 
@@ -47,8 +47,8 @@ void tell_missing(const Case& scene, const std::string& checkpoint, const std::s
   expect(scene.blood && simulation.time() > scene.blood->from_us, "blood.csv");
   if (missing.empty()) return;
   std::error_code ignored;
-  const auto text = fmt::format("{} in {} begin{} at {:.6g} us", fmt::join(missing, ", "), folder, missing.size() == 1 ? "s" : "",
-                                simulation.time());
+  const auto text =
+      fmt::format("{} in {} begin{} at {:.6g} us", fmt::join(missing, ", "), folder, missing.size() == 1 ? "s" : "", simulation.time());
   if (fs::equivalent(folder, fs::absolute(checkpoint, ignored).parent_path(), ignored))
     warn("{}: what was before is not there", text);
   else
@@ -62,8 +62,8 @@ void print_coupling(FlowSimulation& simulation) {
   const auto estimate = simulation.coupling()->stability(dt);
   if (!estimate) return;
   const StabilityEstimate& s = *estimate;
-  info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}",
-       s.mass_term, s.beta, s.threshold(), s.margin());
+  info("coupling: M / (A dt) + beta = {:.3g} + {:.3g} against {:.3g} pg/um2/us, half the fluid's reaction: a margin of {:.2f}", s.mass_term,
+       s.beta, s.threshold(), s.margin());
   const int substeps = simulation.membranes()->substeps(dt, s.beta);
   if (substeps > 1)
     info("membrane: {} sub-steps a step, since it is stable up to {:.3g} us without damping", substeps,
@@ -102,12 +102,12 @@ std::optional<RunTotals> restart(const Case& scene, const std::string& checkpoin
     changed.push_back(change.key);
   }
   if (simulation.done())
-    throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint,
-                                 simulation.time()));
+    throw InputError(fmt::format("{} is already at {:.6g} us, the end of this case; raise time.end_us", checkpoint, simulation.time()));
   if (simulation.at_outflow())
-    throw InputError(fmt::format("{}: {}; to go on, lower time.stop_before_outflow_um, which is {:g} (the least is the way of "
-                                 "two steps)",
-                                 checkpoint, simulation.outflow_message(), scene.time.stop_before_outflow_um));
+    throw InputError(
+        fmt::format("{}: {}; to go on, lower time.stop_before_outflow_um, which is {:g} (the least is the way of "
+                    "two steps)",
+                    checkpoint, simulation.outflow_message(), scene.time.stop_before_outflow_um));
   tell_missing(scene, checkpoint, place.folder, simulation);
   return totals;
 #else
@@ -121,8 +121,8 @@ void blame_changes(const std::vector<std::string>& changed, Report& report) {
   if (changed.empty()) return;
   for (auto& warning : report.warnings)
     if (warning["figure"].get<std::string>().rfind("energy_balance", 0) == 0)
-      warning["message"] = fmt::format("{}. Or it is what the restart has changed: {}", warning["message"].get<std::string>(),
-                                       fmt::join(changed, ", "));
+      warning["message"] =
+          fmt::format("{}. Or it is what the restart has changed: {}", warning["message"].get<std::string>(), fmt::join(changed, ", "));
 }
 
 /// A report of what was done before the computation broke down: by all ranks, or where some are stuck by those that are
@@ -233,8 +233,8 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   } catch (const std::exception& error) {
     progress.finish();
     if (!output && dynamic_cast<const InputError*>(&error)) throw;  // results that this case cannot go on from
-    report.broke_down = fmt::format("at {:.6g} us (step {}): {}", simulation.time() + simulation.next_step_us(),
-                                    simulation.steps() + 1, error.what());
+    report.broke_down =
+        fmt::format("at {:.6g} us (step {}): {}", simulation.time() + simulation.next_step_us(), simulation.steps() + 1, error.what());
     report_breakdown(comm, place.folder, output.get(), report);
     const bool checkpoint = output && !output->last_checkpoint().empty();
     const std::string coarse = simulation.coupling() ? simulation.coupling()->coarse() : "";

@@ -132,11 +132,13 @@ Command parse(CLI::App& app, int argc, char** argv) {
   app.set_version_flag("--version", version_text(), "print version, git hash, back end and libraries, and exit");
   auto* run = app.add_subcommand("run", "run a case to its end");
   run->add_option("case", options.case_path, "case file (TOML)")->required();
-  run->add_option("--out", options.folder, "folder for the results (default: runs/<case>-001 or the first number that is free, with runs/latest leading to it)");
+  run->add_option("--out", options.folder,
+                  "folder for the results (default: runs/<case>-001 or the first number that is free, with runs/latest leading to it)");
   run->add_flag("--overwrite", options.overwrite, "remove the results that the folder of --out holds");
   run->add_option("--set", options.overrides, "override: section.key=value")->take_all()->expected(1)->allow_extra_args(false);
   run->add_option("--restart", options.restart, "checkpoint.h5 to continue from, or the folder that holds it");
-  run->add_flag("--profile", options.profile, "wait for the device after each part of a step, so that the report's times of parts are theirs");
+  run->add_flag("--profile", options.profile,
+                "wait for the device after each part of a step, so that the report's times of parts are theirs");
   run->add_flag("--estimate-error{all}", options.estimate,
                 "error bars from further, coarser runs: spacing, step, vertices (comma-separated), or all");
   run->footer(ends);
@@ -167,8 +169,8 @@ Command parse(CLI::App& app, int argc, char** argv) {
 /// Whether a process that starts alone gets by without message passing, whose start-up takes longer than many a
 /// stretching test. Keeps the case's text. A launcher has set one of these variables for each of its processes.
 bool can_stay_alone(Command& command) {
-  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID",
-                           "PALS_RANKID", "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID", "PALS_RANKID",
+                           "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
     if (std::getenv(name)) return false;
   if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys) return true;
   try {
@@ -185,15 +187,20 @@ int execute(const Comm& comm, const Command& command) {
   return run_command(comm, [&]() -> int {
     check_device_layout();
     switch (command.kind) {
-      case Command::Kind::run: return static_cast<int>(run_case(comm, command.options));
+      case Command::Kind::run:
+        return static_cast<int>(run_case(comm, command.options));
       case Command::Kind::check:
         if (command.resolved)
           print_resolved(comm, command.options);
         else
           check_case(comm, command.options);
         break;
-      case Command::Kind::mesh: write_mesh(command.vertices, command.mesh_path); break;
-      case Command::Kind::keys: log_text(command.markdown ? keys_markdown() : keys_text(command.section)); break;
+      case Command::Kind::mesh:
+        write_mesh(command.vertices, command.mesh_path);
+        break;
+      case Command::Kind::keys:
+        log_text(command.markdown ? keys_markdown() : keys_text(command.section));
+        break;
     }
     return static_cast<int>(exit_done);
   });
@@ -202,8 +209,8 @@ int execute(const Comm& comm, const Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a failed write, with a message
-  std::signal(SIGPIPE, SIG_IGN);  // a run goes on when nobody reads what it says
+  std::signal(SIGXFSZ, SIG_IGN);        // a file that may not grow is a failed write, with a message
+  std::signal(SIGPIPE, SIG_IGN);        // a run goes on when nobody reads what it says
   setenv("OMP_PROC_BIND", "false", 0);  // or Kokkos advises on it at every start
   return_freed_arrays();
   wait_briefly(argv);
@@ -217,7 +224,8 @@ int main(int argc, char** argv) {
   }
 #ifdef CORPUSCLE_MPI
   const bool alone = can_stay_alone(command);
-  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);  // without mpirun Open MPI needs no daemon: it takes longer to start than small scenes run
+  setenv("OMPI_MCA_ess_singleton_isolated", "1",
+         0);  // without mpirun Open MPI needs no daemon: it takes longer to start than small scenes run
   if (!alone) MPI_Init(&argc, &argv);
 #endif
   int code = 0;

@@ -82,8 +82,6 @@ double left_on_device() {
 
 }  // namespace
 
-double memory_at_hand_mb() {
-  return std::min({left_on_machine(), left_in_groups(), left_of_process(), left_on_device()}) / bytes_per_mb;
-}
+double memory_at_hand_mb() { return std::min({left_on_machine(), left_in_groups(), left_of_process(), left_on_device()}) / bytes_per_mb; }
 
 }  // namespace corpuscle

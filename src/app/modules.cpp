@@ -87,8 +87,7 @@ void print_modules(const ModuleList& modules) {
     if (cost == modules.cost.end()) {
       left_out.push_back(name);
     } else {
-      left_out.push_back(
-          fmt::format("{} ({} kernels a step, {:.2g} MB)", name, cost->second.kernels, cost->second.megabytes));
+      left_out.push_back(fmt::format("{} ({} kernels a step, {:.2g} MB)", name, cost->second.kernels, cost->second.megabytes));
     }
   }
   info("active:   {}", fmt::join(modules.active, ", "));

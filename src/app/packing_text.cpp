@@ -7,9 +7,7 @@ namespace corpuscle {
 
 namespace {
 
-const PackingReport* packing_of(FlowSimulation& simulation) {
-  return simulation.coupling() ? simulation.coupling()->packing() : nullptr;
-}
+const PackingReport* packing_of(FlowSimulation& simulation) { return simulation.coupling() ? simulation.coupling()->packing() : nullptr; }
 
 std::string gap_text(double gap, double seen) {
   return gap < 1e29 ? fmt::format("{:.3g} um", gap) : fmt::format("more than {:.3g} um", seen);
@@ -25,8 +23,9 @@ void print_packing(FlowSimulation& simulation) {
     info("populations.{}: {} cell{} \"{}\", hematocrit {:.4f}{}", p, one.cells, one.cells == 1 ? "" : "s", one.type, one.hematocrit,
          one.asked > 0 ? fmt::format(" (asked for {:g})", one.asked) : "");
   }
-  if (packing->smallest_gap_um > 0) info("packing:  tube hematocrit {:.4f}; smallest gap between cells {}, to the sides of the grid {}", packing->tube_hematocrit,
-       gap_text(packing->smallest_gap_um, packing->gaps_seen_um), gap_text(packing->smallest_wall_gap_um, packing->gaps_seen_um));
+  if (packing->smallest_gap_um > 0)
+    info("packing:  tube hematocrit {:.4f}; smallest gap between cells {}, to the sides of the grid {}", packing->tube_hematocrit,
+         gap_text(packing->smallest_gap_um, packing->gaps_seen_um), gap_text(packing->smallest_wall_gap_um, packing->gaps_seen_um));
 }
 
 void fill_packing(Report& report, FlowSimulation& simulation) {

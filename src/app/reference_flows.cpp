@@ -43,8 +43,8 @@ std::map<std::string, double> tube_errors(const Case& scene, FlowSimulation& sim
   const double radius = 0.5 * scene.grid->diameter_um;
   const int layer = index.global[2] * 3 / 4 - index.first[2];
   const bool here = layer >= 0 && layer < index.n[2];
-  const double difference = grid.comm().max(
-      here ? poiseuille_difference(grid.views(), simulation.fluid().velocity(), layer, mean, radius) : 0.0);
+  const double difference =
+      grid.comm().max(here ? poiseuille_difference(grid.views(), simulation.fluid().velocity(), layer, mean, radius) : 0.0);
   const std::map<std::string, double> velocity{{"poiseuille_velocity", difference / (2 * mean)}};
   const int apart = index.global[2] / 8;
   if (apart == 0) return velocity;  // too few layers for a gradient away from the ends
@@ -88,8 +88,8 @@ std::map<std::string, double> couette_errors(const Case& scene, FlowSimulation& 
     const auto& p = scene.fluid->pressure_gradient_Pa_per_um;
     if (speed == 0 || p[0] != 0 || p[1] != 0 || p[2] != 0) return {};
     Grid& grid = simulation.grid();
-    const double difference = grid.comm().max(couette_difference(
-        grid.views(), simulation.fluid().velocity(), d, scene.grid->lower_um[d], scene.grid->upper_um[d], a, b));
+    const double difference = grid.comm().max(
+        couette_difference(grid.views(), simulation.fluid().velocity(), d, scene.grid->lower_um[d], scene.grid->upper_um[d], a, b));
     return {{"couette_velocity", difference / speed}};
   }
   return {};

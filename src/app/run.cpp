@@ -150,15 +150,14 @@ void announce_set_up(const SceneSize& size) {
   constexpr double noticeable = 1;
   const double seconds = estimate_set_up_s(size, thread_count());
   if (seconds > noticeable)
-    info("set-up:   {:.0f} surface vertices, about {} s", size.own, seconds < 10 ? fmt::format("{:.2g}", seconds) : fmt::format("{:.0f}", seconds));
+    info("set-up:   {:.0f} surface vertices, about {} s", size.own,
+         seconds < 10 ? fmt::format("{:.2g}", seconds) : fmt::format("{:.0f}", seconds));
 }
 
 /// What is refused before anything is built.
 void check_options(const Comm& comm, const Case& scene, const RunOptions& options) {
-  if (!options.estimate.empty() && !options.restart.empty())
-    throw InputError("--estimate-error compares whole runs: leave out --restart");
-  if (scene.stretching && !options.restart.empty())
-    throw InputError("--restart: a stretching test has no checkpoints; run it again");
+  if (!options.estimate.empty() && !options.restart.empty()) throw InputError("--estimate-error compares whole runs: leave out --restart");
+  if (scene.stretching && !options.restart.empty()) throw InputError("--restart: a stretching test has no checkpoints; run it again");
   if (scene.stretching && comm.size() > 1)
     throw InputError(fmt::format("a stretching test runs on one rank, not {}: start it without mpirun", comm.size()));
 }
@@ -171,8 +170,7 @@ std::string checkpoint_path(const std::string& named) {
     throw InputError(fmt::format("--restart {}: {}", named, why ? why.message() : "there is no such file or folder"));
   if (!std::filesystem::is_directory(named, ignored)) return named;
   const auto path = std::filesystem::path(named).lexically_normal() / "checkpoint.h5";
-  if (!std::filesystem::exists(path, ignored))
-    throw InputError(fmt::format("--restart {}: this folder holds no checkpoint.h5", named));
+  if (!std::filesystem::exists(path, ignored)) throw InputError(fmt::format("--restart {}: this folder holds no checkpoint.h5", named));
   return path.string();
 }
 
@@ -191,7 +189,8 @@ std::string resolved_file(const RunOptions& options, const Case& scene) {
   std::string from = options.case_path;
   for (const auto& override_text : options.overrides) from += " --set " + override_text;
   std::replace(from.begin(), from.end(), '\n', ' ');
-  return fmt::format("# {}\n# with every key that has a value in it, as corpuscle {} took them.\n{}", from, git_hash(), resolved_text(scene));
+  return fmt::format("# {}\n# with every key that has a value in it, as corpuscle {} took them.\n{}", from, git_hash(),
+                     resolved_text(scene));
 }
 
 }  // namespace
@@ -203,12 +202,11 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
   const MemoryEstimate memory = require_memory(comm, scene);
   check_options(comm, scene, options);
   const auto coarser = options.estimate.empty() ? std::vector<CoarserRun>{} : coarser_runs(scene, options.estimate);
-  const auto earlier = options.overwrite          ? EarlierResults::overwrite
+  const auto earlier = options.overwrite         ? EarlierResults::overwrite
                        : options.restart.empty() ? EarlierResults::refuse
                                                  : EarlierResults::go_on;
   options.restart = checkpoint_path(options.restart);
-  RunFolder folder(comm, options.folder, std::filesystem::path(options.case_path).stem().string(), earlier,
-                   continued(options.restart));
+  RunFolder folder(comm, options.folder, std::filesystem::path(options.case_path).stem().string(), earlier, continued(options.restart));
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   announce_set_up(measure_scene(scene, comm.size()));
@@ -283,15 +281,14 @@ void write_mesh(int vertices, const std::string& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
   const bool stl = extension == ".stl";
   if (!stl && extension != ".off")
-    throw InputError(fmt::format("{}: cannot write a mesh as \"{}\"; use a name that ends in .off or .stl", path,
-                                 extension));
+    throw InputError(fmt::format("{}: cannot write a mesh as \"{}\"; use a name that ends in .off or .stl", path, extension));
   const TriangleMesh mesh = biconcave_mesh(vertices);
   if (stl)
     write_stl(path, mesh, StlFormat::binary);
   else
     write_off(path, mesh);
-  info("{}: {} vertices, {} triangles, area {:.2f} um2, volume {:.2f} um3", path, mesh.vertices.size(),
-       mesh.triangles.size(), area(mesh), volume(mesh));
+  info("{}: {} vertices, {} triangles, area {:.2f} um2, volume {:.2f} um3", path, mesh.vertices.size(), mesh.triangles.size(), area(mesh),
+       volume(mesh));
 }
 
 }  // namespace corpuscle

@@ -13,12 +13,12 @@ namespace corpuscle {
 struct RunOptions {
   std::string case_path;
   std::optional<std::string> case_text;  // where it has been read already: from a pipe it comes only once
-  std::string folder;                  // empty: runs/<name of the case file>-001, or the first number that is free
-  bool overwrite = false;              // results that the folder holds
-  std::vector<std::string> overrides;  // section.key=value
-  std::string restart;                 // checkpoint to continue from, or its folder; empty: from the start
-  bool profile = false;                // wait for the device at the end of each part that is timed
-  std::string estimate;                // coarser runs for error bars (error_estimate.hpp); empty: none
+  std::string folder;                    // empty: runs/<name of the case file>-001, or the first number that is free
+  bool overwrite = false;                // results that the folder holds
+  std::vector<std::string> overrides;    // section.key=value
+  std::string restart;                   // checkpoint to continue from, or its folder; empty: from the start
+  bool profile = false;                  // wait for the device at the end of each part that is timed
+  std::string estimate;                  // coarser runs for error bars (error_estimate.hpp); empty: none
 };
 
 /// Run a case to its end, and then the coarser runs for its error bars.

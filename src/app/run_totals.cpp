@@ -10,16 +10,16 @@
 namespace corpuscle {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Tally, samples, sum, largest)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ImmersedReport, classifications, immersed, inside, isolated, uncovered,
-                                   velocity_fallbacks, least_wall_spacings, least_body_spacings)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyTotals, boundaries, gradient, dissipation, kinetic, on_cells, on_bodies, pushed, elastic,
-                                   contact, membrane_dissipation, membrane_kinetic)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ImmersedReport, classifications, immersed, inside, isolated, uncovered, velocity_fallbacks,
+                                   least_wall_spacings, least_body_spacings)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyTotals, boundaries, gradient, dissipation, kinetic, on_cells, on_bodies, pushed, elastic, contact,
+                                   membrane_dissipation, membrane_kinetic)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(EnergyBalance::State, totals, rates, first, driving_pressure, time, samples)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ContactReport, crossings, limited, smallest_gap, smallest_own_gap, smallest_wall_gap,
                                                 smallest_body_gap, lists)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunTotals, momentum, pressure, projections, coupling, substeps, residual, divergence, flux_correction,
-                                   volume_drift, area_drift, speed, slip_speed, slip_um, way_um, splitting_us,
-                                   splitting_until_us, splitting_max, immersed, contact, energy, blood, wall_s, wall_s_by_part)
+                                   volume_drift, area_drift, speed, slip_speed, slip_um, way_um, splitting_us, splitting_until_us,
+                                   splitting_max, immersed, contact, energy, blood, wall_s, wall_s_by_part)
 
 namespace {
 

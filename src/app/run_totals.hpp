@@ -26,8 +26,8 @@ struct RunTotals {
   ImmersedReport immersed;
   ContactReport contact;
   EnergyBalance::State energy;
-  std::vector<double> blood;                     // of BloodSampler
-  double wall_s = 0;                             // of the runs before this one, and of each part
+  std::vector<double> blood;  // of BloodSampler
+  double wall_s = 0;          // of the runs before this one, and of each part
   std::map<std::string, double> wall_s_by_part;
 
   /// A sample stands for the time since the one before it.

@@ -11,8 +11,7 @@ namespace corpuscle {
 
 namespace {
 
-constexpr std::pair<int, const char*> taken[] = {
-    {SIGTERM, "SIGTERM"}, {SIGINT, "SIGINT"}, {SIGHUP, "SIGHUP"}, {SIGUSR1, "SIGUSR1"}};
+constexpr std::pair<int, const char*> taken[] = {{SIGTERM, "SIGTERM"}, {SIGINT, "SIGINT"}, {SIGHUP, "SIGHUP"}, {SIGUSR1, "SIGUSR1"}};
 
 volatile std::sig_atomic_t pending = 0;
 volatile std::sig_atomic_t since_s = 0;

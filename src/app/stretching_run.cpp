@@ -86,8 +86,7 @@ Ending run_stretching(const Comm& comm, const Case& scene, const Place& place) {
     const auto mesh = body_mesh(set, 0);
     std::vector<std::int32_t> triangles;
     for (const auto& t : mesh.triangles) triangles.insert(triangles.end(), t.begin(), t.end());
-    cells = std::make_unique<CellWriter>(folder, comm, triangles, std::vector<std::int32_t>(set.triangles, 0),
-                                         set.vertices);
+    cells = std::make_unique<CellWriter>(folder, comm, triangles, std::vector<std::int32_t>(set.triangles, 0), set.vertices);
   }
 #endif
   timers.start("relaxation");
@@ -96,12 +95,11 @@ Ending run_stretching(const Comm& comm, const Case& scene, const Place& place) {
     const auto scope = timers.scope("output");
     history.write(sample_of(step));
 #ifdef CORPUSCLE_HDF5
-    if (cells)
-      cells->write(step.force_pN, number, vertex_values(membranes.vertices(), membranes.surfaces().x).data());
+    if (cells) cells->write(step.force_pN, number, vertex_values(membranes.vertices(), membranes.surfaces().x).data());
 #endif
     ++number;
-    info("{:7.1f} pN   axial {:7.3f} um   transverse {:7.3f} um   {:6d} iterations   residual {:.1e}", step.force_pN,
-         step.axial_um, step.transverse_um, step.iterations, step.residual);
+    info("{:7.1f} pN   axial {:7.3f} um   transverse {:7.3f} um   {:6d} iterations   residual {:.1e}", step.force_pN, step.axial_um,
+         step.transverse_um, step.iterations, step.residual);
     if (report.stopped = signal.asked(); !report.stopped.empty()) throw Stopped{};
   };
   const auto finish = [&] {

@@ -32,17 +32,21 @@ std::string shape_text(const CellSettings& c) {
       return fmt::format("{} vertices, a sphere of radius {:g} um{}", c.vertices, c.radius_um,
                          c.inflation > 0 ? fmt::format(" inflated by {:g} %", 100 * c.inflation) : "");
     case CellSettings::Shape::ellipsoid:
-      return fmt::format("{} vertices, an ellipsoid of semi-axes {:g} x {:g} x {:g} um", c.vertices, c.semi_axes_um[0],
-                         c.semi_axes_um[1], c.semi_axes_um[2]);
-    default: return fmt::format("{} vertices, biconcave, {:g} um wide", c.vertices, c.diameter_um);
+      return fmt::format("{} vertices, an ellipsoid of semi-axes {:g} x {:g} x {:g} um", c.vertices, c.semi_axes_um[0], c.semi_axes_um[1],
+                         c.semi_axes_um[2]);
+    default:
+      return fmt::format("{} vertices, biconcave, {:g} um wide", c.vertices, c.diameter_um);
   }
 }
 
 std::string law_text(const CellSettings& c) {
   switch (c.law) {
-    case CellSettings::Law::neo_hookean: return "neo-hookean";
-    case CellSettings::Law::skalak: return fmt::format("skalak, C = {:g}", c.skalak_c);
-    default: return "wlc-pow";
+    case CellSettings::Law::neo_hookean:
+      return "neo-hookean";
+    case CellSettings::Law::skalak:
+      return fmt::format("skalak, C = {:g}", c.skalak_c);
+    default:
+      return "wlc-pow";
   }
 }
 
@@ -59,9 +63,8 @@ void print_cell_types(const Case& scene) {
   };
   for (std::size_t k = 0; k < scene.cell_types.size(); ++k) {
     const auto& [name, cell] = scene.cell_types[k];
-    info("cell type \"{}\": {}; {}, shear modulus {:g} uN/m; {}", name, shape_text(cell), law_text(cell),
-         cell.shear_modulus_uN_per_m,
-         !packed(int(k))       ? cells_text(count(int(k)))
+    info("cell type \"{}\": {}; {}, shear modulus {:g} uN/m; {}", name, shape_text(cell), law_text(cell), cell.shear_modulus_uN_per_m,
+         !packed(int(k))      ? cells_text(count(int(k)))
          : count(int(k)) == 0 ? std::string("cells of populations")
                               : cells_text(count(int(k))) + " beside those of its populations");
   }

@@ -28,9 +28,8 @@ BloodFiles::BloodFiles(const std::string& folder, const Comm& comm, std::optiona
 void BloodFiles::write(const BloodSample& sample) {
   on_root(comm_, [&] {
     std::string line = fmt::format("{:.17g}", sample.time_us);
-    for (const double value :
-         {sample.hematocrit, sample.mean_speed / units::mm_per_s, sample.cell_speed / units::mm_per_s,
-          sample.discharge_hematocrit, sample.relative_viscosity, sample.cell_free_layer_um})
+    for (const double value : {sample.hematocrit, sample.mean_speed / units::mm_per_s, sample.cell_speed / units::mm_per_s,
+                               sample.discharge_hematocrit, sample.relative_viscosity, sample.cell_free_layer_um})
       line += std::isfinite(value) ? fmt::format(",{:.17g}", value) : ",";
     table_.write(line);
   });
@@ -52,8 +51,7 @@ void BloodFiles::write_profile([[maybe_unused]] const BloodSampler& sampler, [[m
     write("velocity_um", profile.velocity_um);
     write("velocity_mm_per_s", profile.velocity_mm_per_s);
     write("velocity_error_mm_per_s", profile.velocity_error_mm_per_s);
-    file.attribute("/", "across",
-                   std::string(sampler.tube() ? "distance from the centreline" : "height over the lower wall"));
+    file.attribute("/", "across", std::string(sampler.tube() ? "distance from the centreline" : "height over the lower wall"));
     file.attribute("/", "time_us", time_us);
     file.attribute("/", "samples", static_cast<std::int64_t>(sampler.samples()));
     file.close();

@@ -103,8 +103,7 @@ void BloodSampler::make_profile() {
     profile_.lengthening = Array<double>(uninitialised("corpuscle::blood::lengthening"), owned);
     find_directions(grid.views(), frame_, profile_);
   }
-  profile_parts_ =
-      Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
+  profile_parts_ = Table<double>(uninitialised("corpuscle::blood::profile_parts"), bins * sections, ProfileColumn::count);
   profile_parts_host_ = HostCopy(profile_parts_);
   profile_sums_.resize(bins * ProfileColumn::count);
   // The share of the whole that a bin is, of the grid's volume: exact for tubes, bent ones too, and between walls.
@@ -126,8 +125,7 @@ void BloodSampler::measure_cells() {
   const Membranes& membranes = *simulation_.membranes();
   const int cells = membranes.cells();
   if (const auto rows = static_cast<std::size_t>(cells) * sections; !cell_parts_.data() || cell_parts_.extent(0) < rows)
-    cell_parts_ =
-        Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
+    cell_parts_ = Table<double>(uninitialised("corpuscle::blood::cell_parts"), rows + rows / 10 + sections, cell_totals_.size());
   sum_cell_flow(membranes.surfaces(), cells, frame_, bins_, cell_parts_, cell_totals_);
   add_ranks(simulation_.grid().comm(), cell_totals_host_.read(), cell_sums_);
 }
@@ -135,8 +133,7 @@ void BloodSampler::measure_cells() {
 /// Volumes and velocities of the bins, of all ranks.
 void BloodSampler::measure_flow() {
   const int bins = std::max(bins_, 1);
-  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins,
-              profile_parts_);
+  sum_profile(simulation_.grid().views(), profile_, frame_.tangent, simulation_.fluid().velocity(), bins, profile_parts_);
   const auto& parts = profile_parts_host_.read();
   for (int b = 0; b < bins; ++b)
     for (int q = 0; q < ProfileColumn::count; ++q) {
@@ -190,8 +187,7 @@ BloodSampler::WallShear BloodSampler::wall_shear() {
     for (int m = 0; m < 3; ++m) velocity[end][m] = wall.velocity ? factor * (*wall.velocity)[m] : 0;
     if (grid.halo().neighbour(d, end) >= 0) continue;
     const auto force_on = fluid.skewed() ? wall_force<true> : wall_force<false>;
-    const auto side =
-        force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
+    const auto side = force_on(grid.views(), fluid.coefficients(), d, end, fluid.viscosity(), fluid.velocity(), frame_.tangent);
     sums[2 * end] = side[0], sums[2 * end + 1] = side[1];
   }
   grid.comm().sum(sums, 4);
@@ -233,12 +229,10 @@ const BloodSample& BloodSampler::sample() {
                              moving ? std::abs(walls.rate) : unknown,
                              last_.cell_free_layer_um};
   for (int b = 0; b < bins_; ++b)
-    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) /
-                     bin_volume_[b]);
+    values.push_back((cell_sums_[Cells::within + b] - (b > 0 ? cell_sums_[Cells::within + b - 1] : 0)) / bin_volume_[b]);
   for (int b = 0; b < bins_; ++b) {
     const double* sums = profile_sums_.data() + b * ProfileColumn::count;
-    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume]
-                                                     : unknown);
+    values.push_back(sums[ProfileColumn::volume] > 0 ? sums[ProfileColumn::speed] / sums[ProfileColumn::volume] : unknown);
   }
   means_.add(values);
   return last_;
@@ -252,7 +246,8 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
     if (!block.contains(name)) missing[name] = why;
   };
   if (samples() == 0) {
-    missing["all"] = "nothing was sampled: the run ended before blood.from_us, or before the first multiple of blood.sample_every_us after it";
+    missing["all"] =
+        "nothing was sampled: the run ended before blood.from_us, or before the first multiple of blood.sample_every_us after it";
     return;
   }
   const std::string undriven = "no flow is driven through the grid in one direction" + (flow_ ? "" : ": " + no_flow_);
@@ -263,14 +258,14 @@ void BloodSampler::add_notes(nlohmann::json& block) const {
   leave("discharge_hematocrit", still);
   leave("mean_speed_mm_per_s", still);
   leave("cell_speed_mm_per_s", still);
-  leave("relative_apparent_viscosity", !flow_                          ? undriven
+  leave("relative_apparent_viscosity", !flow_                         ? undriven
                                        : !flow_->no_viscosity.empty() ? flow_->no_viscosity
                                        : by_walls()                   ? "the walls were at rest at all samples"
                                                                       : "nothing flowed");
-  leave("cell_free_layer_um", frame_.guided() ? "there was no cell along the flow at any sample"
+  leave("cell_free_layer_um", frame_.guided()             ? "there was no cell along the flow at any sample"
                               : flow_ && flow_->duct >= 0 ? "between four walls it is not measured"
-                              : flow_         ? "the flow has no walls to the sides"
-                                              : undriven);
+                              : flow_                     ? "the flow has no walls to the sides"
+                                                          : undriven);
   leave("smallest_gap_um", simulation_.coupling()->contact_report() ? "nothing came within reach of the contact" : "there is no [contact]");
   leave("crossings", "there is no [contact]");
   if (missing.empty()) block.erase("left_out");
@@ -283,8 +278,7 @@ void BloodSampler::put_figure(nlohmann::json& block, const Figure& figure) const
   const std::string error_name = figure.name + "_error" + figure.unit;
   block[figure.name + figure.unit] = figure.value;
   if (series.samples() < samples())
-    block["samples_left_out"][figure.name] =
-        fmt::format("{} of {}, in which it has no value", samples() - series.samples(), samples());
+    block["samples_left_out"][figure.name] = fmt::format("{} of {}, in which it has no value", samples() - series.samples(), samples());
   const double time = series.correlation() * every_us_, effective = series.effective_samples();
   if (figure.known) {
     block[error_name] = figure.error;
@@ -295,9 +289,10 @@ void BloodSampler::put_figure(nlohmann::json& block, const Figure& figure) const
   block["left_out"][error_name] =
       series.samples() < RunningMean::least_blocks
           ? fmt::format("{} samples are too few, {} are needed at least", series.samples(), RunningMean::least_blocks)
-          : fmt::format("at least {}: samples are alike for {:.2g} us at least and count for {:.2g} at most, too few to tell; run "
-                        "for longer (time.end_us)",
-                        to_text(figure.error, figure.unit), time, effective);
+          : fmt::format(
+                "at least {}: samples are alike for {:.2g} us at least and count for {:.2g} at most, too few to tell; run "
+                "for longer (time.end_us)",
+                to_text(figure.error, figure.unit), time, effective);
 }
 
 /// What the walls' drag says; each sample counts with its rate of shear.
@@ -337,9 +332,9 @@ void BloodSampler::put_steady(nlohmann::json& block) const {
     return;
   }
   block["steady"] = nullptr;
-  block["left_out"]["steady"] = any ? "the samples are too few, or too much alike, to tell a drift from chance"
-                                      : flow_ ? "nothing that could drift has a value"
-                                              : "no figure of a flow has a value: " + no_flow_;
+  block["left_out"]["steady"] = any     ? "the samples are too few, or too much alike, to tell a drift from chance"
+                                : flow_ ? "nothing that could drift has a value"
+                                        : "no figure of a flow has a value: " + no_flow_;
 }
 
 nlohmann::json BloodSampler::report() const {

@@ -48,8 +48,7 @@ MaterialViews make_material(const std::vector<CellReference>& types) {
 
 }  // namespace
 
-CellShapes::CellShapes(const std::vector<CellReference>& types, const FlowFrame* frame)
-    : material_(make_material(types)) {
+CellShapes::CellShapes(const std::vector<CellReference>& types, const FlowFrame* frame) : material_(make_material(types)) {
   columns_ = {"deformation"};
   if (!frame || !frame->guided()) return;
   frame_ = *frame;

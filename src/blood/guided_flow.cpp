@@ -25,9 +25,7 @@ const BoundarySettings& side_of(const Case& scene, int number) {
                        [&](const BoundarySettings& b) { return static_cast<int>(b.side) == number; });
 }
 
-int entry_of(const Case& scene, int number) {
-  return static_cast<int>(&side_of(scene, number) - scene.boundaries.data());
-}
+int entry_of(const Case& scene, int number) { return static_cast<int>(&side_of(scene, number) - scene.boundaries.data()); }
 
 /// A unit vector across another.
 Vec3 any_across(const Vec3& a) {
@@ -86,8 +84,8 @@ GuidedFlow tube_flow(const Case& scene, FluidSolver& fluid) {
     set_line(grid, frame);
   }
   const double gradient = -fluid.imposed_gradient().z;
-  const bool still = std::none_of(scene.boundaries.begin(), scene.boundaries.end(),
-                                  [](const BoundarySettings& b) { return b.type == Type::moving_wall; });
+  const bool still =
+      std::none_of(scene.boundaries.begin(), scene.boundaries.end(), [](const BoundarySettings& b) { return b.type == Type::moving_wall; });
   flow.driven = still && (norm(fluid.imposed_gradient()) > 0 || !frame.periodic);
   if (frame.kind == FlowFrame::Kind::swept)
     flow.no_viscosity = "what plasma alone does in a bent tube is not known";
@@ -194,8 +192,7 @@ std::optional<GuidedFlow> box_flow(const Case& scene, FluidSolver& fluid) {
     if (flow.driven && gradient > 0)
       flow.gradient = gradient;
     else if (!flow.sheared)
-      flow.no_viscosity =
-          flow.driven ? "no pressure gradient is imposed" : "both moving walls and a pressure gradient drive the flow";
+      flow.no_viscosity = flow.driven ? "no pressure gradient is imposed" : "both moving walls and a pressure gradient drive the flow";
   }
   complete(frame);
   return flow;
@@ -247,7 +244,8 @@ std::string why_unguided(const Case& scene) {
     const bool low = is_wall(side_of(scene, 2 * e)), high = is_wall(side_of(scene, 2 * e + 1));
     walls += low + high, pairs += low && high;
   }
-  if (walls > 0 && (pairs != 1 || walls != 2) && (pairs != 2 || walls != 4)) return "there are walls on other sides than two that face each other";
+  if (walls > 0 && (pairs != 1 || walls != 2) && (pairs != 2 || walls != 4))
+    return "there are walls on other sides than two that face each other";
   return "there is no pressure gradient, no inlet, and no wall that moves along another";
 }
 
@@ -319,8 +317,7 @@ double plasma_speed(const Comm& comm, const Case& scene, const GuidedFlow& flow)
   return comm.sum(speed);
 }
 
-void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
-                      const Components<double>& stress) {
+void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid, const Components<double>& stress) {
   const WallSides sides = walls_of(boundaries);
   const auto find = fluid.skewed() ? wall_stress_field<true> : wall_stress_field<false>;
   find(fluid.grid().views(), fluid.coefficients(), sides, fluid.viscosity(), fluid.velocity(), stress);

@@ -33,14 +33,13 @@ std::string why_unguided(const Case& scene);
 std::array<int, 3> plasma_piece(const std::array<int, 3>& cells, const std::array<bool, 3>& unchanged);
 
 /// Mean speed at which plasma alone flows in a straight tube or between walls, um/us: solved for on a piece of the same
-/// grid a few cells long, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank calls; the first one has
-/// the piece. @pre flow.gradient is not 0
+/// grid a few cells long, so that its error is the same as that of the scene and leaves no trace in their ratio. Every rank calls; the
+/// first one has the piece. @pre flow.gradient is not 0
 /// @throws ComputationError  on all ranks
 double plasma_speed(const Comm& comm, const Case& scene, const GuidedFlow& flow);
 
 /// Stress of the flow on the walls around this block, resting and moving ones, into `stress` [cell, 3] of owned cells,
 /// kPa. Cells nearer to a wall than the kernel reaches act on it besides, by what is not in it.
-void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid,
-                      const Components<double>& stress);
+void find_wall_stress(const std::vector<BoundarySettings>& boundaries, FluidSolver& fluid, const Components<double>& stress);
 
 }  // namespace corpuscle

@@ -42,7 +42,7 @@ class RunningMean {
   /// Sums over blocks of one length, of what is beyond the first sample: less is lost to rounding.
   struct Level {
     long blocks = 0;
-    bool waiting = false;  // the last one, for the next, to make up a longer one
+    bool waiting = false;                                        // the last one, for the next, to make up a longer one
     double sum = 0, square = 0, trend = 0, steps = 0, last = 0;  // trend: times its number; steps: squares, from one to the next
   };
   struct Spread {

@@ -25,15 +25,13 @@ const char* const numbers_name = "cell_numbers";  // steps begun, and ranks
 
 Rows vertex_rows(const SharedCells& cells) {
   Rows rows;
-  for (const CellRecord& cell : cells.own())
-    rows.add(cell.first_vertex, cells.membranes().types()[cell.type].mesh.vertices.size());
+  for (const CellRecord& cell : cells.own()) rows.add(cell.first_vertex, cells.membranes().types()[cell.type].mesh.vertices.size());
   return rows;
 }
 
 Rows triangle_rows(const SharedCells& cells) {
   Rows rows;
-  for (const CellRecord& cell : cells.own())
-    rows.add(cell.first_triangle, cells.membranes().types()[cell.type].mesh.triangles.size());
+  for (const CellRecord& cell : cells.own()) rows.add(cell.first_triangle, cells.membranes().types()[cell.type].mesh.triangles.size());
   return rows;
 }
 
@@ -46,8 +44,7 @@ Rows cell_rows(const SharedCells& cells) {
 void write_cells(CheckpointWriter& file, const Comm& comm, const SharedCells& cells) {
   std::vector<std::int64_t> table;
   for (const CellRecord& cell : cells.own())
-    table.insert(table.end(), {cell.type, cell.laps[0], cell.laps[1], cell.laps[2], comm.rank(), cell.first_vertex,
-                               cell.first_triangle});
+    table.insert(table.end(), {cell.type, cell.laps[0], cell.laps[1], cell.laps[2], comm.rank(), cell.first_vertex, cell.first_triangle});
   const auto width = 3 * static_cast<hsize_t>(cells.membranes().carried().size());
   file.add(table_name, {static_cast<hsize_t>(cells.total()), columns}, cell_rows(cells), table.data());
   file.add(carried_name, {static_cast<hsize_t>(cells.total_vertices()), width}, vertex_rows(cells), cells.carried().data());
@@ -100,8 +97,8 @@ void read_cells(const CheckpointReader& file, const Comm& comm, SharedCells& cel
       vertices += cells.membranes().types()[cell.type].mesh.vertices.size();
     }
     std::vector<double> rows(vertices * columns_stored);
-    file.read(carried_name, carried_shape,
-              Slab{{static_cast<hsize_t>(records.front().first_vertex), 0}, {vertices, columns_stored}}, rows.data());
+    file.read(carried_name, carried_shape, Slab{{static_cast<hsize_t>(records.front().first_vertex), 0}, {vertices, columns_stored}},
+              rows.data());
     carried.assign(vertices * width, 0.0);
     for (hsize_t v = 0; v < vertices; ++v)
       for (hsize_t c = 0; c < std::min(width, columns_stored); ++c) carried[v * width + c] = rows[v * columns_stored + c];

@@ -91,15 +91,14 @@ void CopyMessages::set_parts(const std::vector<Copy>& sent) {
 /// From one side's message to the other's, on whichever ranks they are.
 void CopyMessages::pass(const Side& from, const Side& to) const {
   const auto is_own = [this](const Segment& s) { return s.rank == comm_.rank(); };
-  [[maybe_unused]] const bool others = !std::all_of(from.segments.begin(), from.segments.end(), is_own) ||
-                                       !std::all_of(to.segments.begin(), to.segments.end(), is_own);
+  [[maybe_unused]] const bool others =
+      !std::all_of(from.segments.begin(), from.segments.end(), is_own) || !std::all_of(to.segments.begin(), to.segments.end(), is_own);
 #ifdef CORPUSCLE_MPI
   if (others) {
     constexpr int tag = 72;
     std::vector<MPI_Request> requests;
     for (const Segment& s : to.segments)
-      if (!is_own(s))
-        MPI_Irecv(&to.host(s.first, 0), 3 * s.count, MPI_DOUBLE, s.rank, tag, comm_.handle(), &requests.emplace_back());
+      if (!is_own(s)) MPI_Irecv(&to.host(s.first, 0), 3 * s.count, MPI_DOUBLE, s.rank, tag, comm_.handle(), &requests.emplace_back());
     Kokkos::deep_copy(from.host, from.message);
     for (const Segment& s : from.segments)
       if (!is_own(s)) {

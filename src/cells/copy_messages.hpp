@@ -14,11 +14,11 @@ class CopyMessages {
  public:
   /// A copy, as its cell's rank or the copy's own sees it.
   struct Copy {
-    int rank;      // the other one's
-    int cell;      // on this rank
+    int rank;  // the other one's
+    int cell;  // on this rank
     int vertices;
-    int image;     // which shift
-    Vec3 shift;    // um
+    int image;   // which shift
+    Vec3 shift;  // um
   };
 
   CopyMessages() = default;

@@ -87,8 +87,6 @@ int RankBlocks::owner(const Vec3& point) const {
   return static_cast<int>(nearest / samples);
 }
 
-bool RankBlocks::reaches(const SpaceBox& box, int rank) const {
-  return overlap(box, around_[rank]);
-}
+bool RankBlocks::reaches(const SpaceBox& box, int rank) const { return overlap(box, around_[rank]); }
 
 }  // namespace corpuscle

@@ -51,9 +51,9 @@ class RankBlocks {
  private:
   static constexpr int samples = 8;  // of a block: the middles of its eighths
 
-  std::vector<SpaceBox> around_;     // [rank] its cells and layers
+  std::vector<SpaceBox> around_;  // [rank] its cells and layers
   SpaceBox whole_;
-  std::vector<Vec3> samples_;   // [rank * samples]
+  std::vector<Vec3> samples_;  // [rank * samples]
   PeriodicFrame frame_;
 };
 

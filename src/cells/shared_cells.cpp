@@ -43,8 +43,7 @@ SpaceBox box_of(const HostMirror<Table<double>>& boxes, int cell, double margin)
 
 }  // namespace
 
-SharedCells::SharedCells(const CellPlaces& places, const Grid& grid, int layers, double contact_um,
-                         std::shared_ptr<Workspace> workspace)
+SharedCells::SharedCells(const CellPlaces& places, const Grid& grid, int layers, double contact_um, std::shared_ptr<Workspace> workspace)
     : comm_(grid.comm()),
       blocks_(grid, layers),
       shift_turns_(period_turns(grid, most_turns)),
@@ -113,8 +112,7 @@ void SharedCells::measure(double ahead_us) {
 bool SharedCells::begin_step(double ahead_us) {
   const bool review = steps_++ % review_every == 0;
   measure(ahead_us);
-  const Departures departures =
-      find_departures(static_cast<int>(own_.size()), boxes_, before_, skin_, frame_, far_share);
+  const Departures departures = find_departures(static_cast<int>(own_.size()), boxes_, before_, skin_, frame_, far_share);
   bool moved = false;
   if (review || departures.mean) {
     Kokkos::deep_copy(boxes_host_, boxes_);
@@ -165,8 +163,8 @@ bool SharedCells::wrap(double share) {
 std::vector<int> SharedCells::owners() const {
   std::vector<int> owner;
   for (std::size_t c = 0; c < own_.size(); ++c)
-    owner.push_back(blocks_.owner(
-        {boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1), boxes_host_(c, BoxColumn::mean + 2)}));
+    owner.push_back(
+        blocks_.owner({boxes_host_(c, BoxColumn::mean), boxes_host_(c, BoxColumn::mean + 1), boxes_host_(c, BoxColumn::mean + 2)}));
   return owner;
 }
 
@@ -182,8 +180,8 @@ std::vector<double> SharedCells::carried() const {
   return values;
 }
 
-void SharedCells::restore(const std::vector<CellRecord>& cells, const std::vector<double>& carried,
-                          const std::vector<int>& owners, long steps) {
+void SharedCells::restore(const std::vector<CellRecord>& cells, const std::vector<double>& carried, const std::vector<int>& owners,
+                          long steps) {
   own_ = cells;
   set_own(carried);
   measure(0);
@@ -245,8 +243,7 @@ void SharedCells::distribute(const std::vector<int>& owners) {
       n = one.at + width * vertices_of(one.cell.type) * sizeof(double);
       arrivals.push_back(one);
     }
-  std::sort(arrivals.begin(), arrivals.end(),
-            [](const Arrival& a, const Arrival& b) { return a.cell.number < b.cell.number; });
+  std::sort(arrivals.begin(), arrivals.end(), [](const Arrival& a, const Arrival& b) { return a.cell.number < b.cell.number; });
   own_.clear();
   std::vector<double> carried;
   for (const Arrival& one : arrivals) {
@@ -289,10 +286,11 @@ std::string SharedCells::unseen_images(const SpaceBox& around, int cell) const {
       half += 0.5 * std::abs(frame_.dual[d][m]) * (box.upper[m] - box.lower[m] + around.upper[m] - around.lower[m]);
     }
     if (next - std::abs(apart) <= half)
-      return fmt::format("{} reaches over too many periods of the grid along {}, of {:.3g} um: it meets more than {} images of itself "
-                         "each way. Likely cause: a grid too short for the cell, or, in a run, a step too long for the flow: lengthen the "
-                         "grid (grid.upper_um, grid.length_um), or reduce time.step_us",
-                         body_name(surfaces(), cell), "ijk"[d], norm(frame_.period[d]), most_turns);
+      return fmt::format(
+          "{} reaches over too many periods of the grid along {}, of {:.3g} um: it meets more than {} images of itself "
+          "each way. Likely cause: a grid too short for the cell, or, in a run, a step too long for the flow: lengthen the "
+          "grid (grid.upper_um, grid.length_um), or reduce time.step_us",
+          body_name(surfaces(), cell), "ijk"[d], norm(frame_.period[d]), most_turns);
   }
   return "";
 }
@@ -321,8 +319,7 @@ void SharedCells::renew_copies() {
         if (!blocks_.reaches(seen, rank) && !(contact_ > 0 && overlap(seen, reach[rank]))) continue;
         const Notice notice{own_[c].type, own_[c].number, static_cast<int>(image)};
         put(notices[rank], &notice, 1);
-        wanted[rank].push_back(
-            {rank, static_cast<int>(c), vertices_of(own_[c].type), static_cast<int>(image), shifts_[image]});
+        wanted[rank].push_back({rank, static_cast<int>(c), vertices_of(own_[c].type), static_cast<int>(image), shifts_[image]});
       }
     }
   }
@@ -339,9 +336,8 @@ void SharedCells::renew_copies() {
   // Copies stand in an order that does not depend on whose they are.
   std::vector<int> order(told.size());
   for (std::size_t n = 0; n < order.size(); ++n) order[n] = static_cast<int>(n);
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    return std::make_pair(told[a].number, told[a].image) < std::make_pair(told[b].number, told[b].image);
-  });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::make_pair(told[a].number, told[a].image) < std::make_pair(told[b].number, told[b].image); });
   std::vector<HeldCell> held;
   for (const CellRecord& cell : own_) held.push_back({cell.type, cell.number});
   for (int n : order) {
@@ -364,9 +360,7 @@ void SharedCells::note_turns(const std::vector<CopyMessages::Copy>& received) {
   Kokkos::deep_copy(turns_, turns);
 }
 
-void SharedCells::to_copies(const Components<double>& field, bool positions) {
-  messages_.to_copies(surfaces(), field, positions);
-}
+void SharedCells::to_copies(const Components<double>& field, bool positions) { messages_.to_copies(surfaces(), field, positions); }
 
 void SharedCells::add_copies(const Components<double>& field) { messages_.add_copies(surfaces(), field); }
 

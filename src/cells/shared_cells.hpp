@@ -63,8 +63,7 @@ class SharedCells {
   /// Go on with these cells, whichever rank they are read by. Every rank calls.
   /// @param carried  [vertex][field of Membranes::carried()][3] of the cells, one after the other
   /// @param owners   [cell] rank, or empty: by their places
-  void restore(const std::vector<CellRecord>& cells, const std::vector<double>& carried, const std::vector<int>& owners,
-               long steps);
+  void restore(const std::vector<CellRecord>& cells, const std::vector<double>& carried, const std::vector<int>& owners, long steps);
   /// What restore() takes, of the own cells.
   std::vector<double> carried() const;
 

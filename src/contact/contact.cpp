@@ -17,14 +17,14 @@ namespace corpuscle {
 
 namespace {
 
-constexpr double far_away = 1e30;      // um
-constexpr double keep_share = 0.5;     // of a gap, in one step
-constexpr double enough_kept = 1e-3;   // of what is to be kept, that may be missing
+constexpr double far_away = 1e30;         // um
+constexpr double keep_share = 0.5;        // of a gap, in one step
+constexpr double enough_kept = 1e-3;      // of what is to be kept, that may be missing
 constexpr double followed_way = 1.0 / 3;  // of a cell's radius, in one step: lists of what is near take in all within several such ways
-constexpr double opening = 0.15;       // rate at which a film's gap follows its pressure, over gap and viscosity
-constexpr double followed = 0.5;       // of a gap's excess, that one step may undo
-constexpr double healed_share = 0.1;   // of the range, to which crossings are opened again
-constexpr double deepest_share = 0.8;  // of the range, from which crossings are put back
+constexpr double opening = 0.15;          // rate at which a film's gap follows its pressure, over gap and viscosity
+constexpr double followed = 0.5;          // of a gap's excess, that one step may undo
+constexpr double healed_share = 0.1;      // of the range, to which crossings are opened again
+constexpr double deepest_share = 0.8;     // of the range, from which crossings are put back
 constexpr int most_passes = 8, most_repairs = 20;
 
 /// Room for so many rows, with some to spare; what was there is lost where there was not enough.
@@ -103,8 +103,8 @@ int last_value(const Array<int>& view, int at) {
 
 }  // namespace
 
-Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
-                 double blend_um, const ContactPeers* peers)
+Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity, double blend_um,
+                 const ContactPeers* peers)
     : settings_(settings),
       surface_(surfaces),
       images_(images),
@@ -113,8 +113,7 @@ Contact::Contact(const ContactSettings& settings, const SurfaceSet& surfaces, co
   if (peers) peers_ = *peers;
   constexpr double apart = 1.5;  // of the range: a sheet that is compressed by a third does not repel itself
   reach_.own = settings.range_um;
-  reach_.other =
-      std::max({settings.range_um, blend_um, settings.aggregation_energy > 0 ? settings.aggregation_range_um : 0.0});
+  reach_.other = std::max({settings.range_um, blend_um, settings.aggregation_energy > 0 ? settings.aggregation_range_um : 0.0});
   reach_.apart = apart * settings.range_um;
   make_arrays();
   if (peers) return;  // take_up() follows
@@ -234,7 +233,7 @@ StepWays Contact::choose_motion(const TriangleBounds& bounds, double dt) {
 void Contact::make_lists(const StepWays& ways, double dt) {
   constexpr double steps = 6, least = 0.5;  // of the range
   constexpr double skins = 4, drifts = 8;   // of which vertices may drift
-  if (surface_.vertices == 0) return;  // on this rank, at present
+  if (surface_.vertices == 0) return;       // on this rank, at present
   if (lists_hold(ways, dt)) return;
   const TriangleBounds bounds = bounds_of_triangles(surface_);
   refuse_far_away(bounds);
@@ -247,7 +246,7 @@ void Contact::make_lists(const StepWays& ways, double dt) {
   span_ = width + 2 * bounds.radius;
   GapsWanted wanted = peers_ ? peers_->gaps : GapsWanted();
   wander_ = wanted.everywhere() || surface_.own_cells == surface_.cells ? far_away
-                                                                       : std::max({skins * skin_, reach_.other, drifts * ahead.drift});
+                                                                        : std::max({skins * skin_, reach_.other, drifts * ahead.drift});
   for (int d = 0; d < 3; ++d) {
     wanted.lower[d] -= wander_;
     wanted.upper[d] += wander_;
@@ -367,12 +366,14 @@ void Contact::mend_crossings(double time, double dt) {
       const double way = fastest_crossing(dt);
       const std::string cause =
           way > settings_.range_um
-              ? fmt::format("They came from beyond contact.range_um = {:g}, by {:.2g} um in a step of {:.3g} us, so that contact had no "
-                            "part in it. Likely cause: a membrane that blows up, or a step too long for the load: reduce time.step_us "
-                            "or the load",
-                            settings_.range_um, way, dt)
-              : std::string("Likely cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise "
-                            "contact.pressure_Pa or contact.range_um, or reduce the load");
+              ? fmt::format(
+                    "They came from beyond contact.range_um = {:g}, by {:.2g} um in a step of {:.3g} us, so that contact had no "
+                    "part in it. Likely cause: a membrane that blows up, or a step too long for the load: reduce time.step_us "
+                    "or the load",
+                    settings_.range_um, way, dt)
+              : std::string(
+                    "Likely cause: a step too long, or a load that contact cannot hold: reduce time.step_us, raise "
+                    "contact.pressure_Pa or contact.range_um, or reduce the load");
       throw ComputationError(
           fmt::format("surfaces cross: {} at {:.6g} us, {} vertices by up to {:.2g} um, too many or too far to be put back. {}",
                       told_text(found.first), time, found.vertices, found.deepest, cause));
@@ -415,9 +416,8 @@ void Contact::look_at_start(double dt) {
   find_now();
   const auto found = crossings();
   if (found.vertices > 0)
-    throw InputError(
-        fmt::format("surfaces cross: {}, by {} vertices, before the first step: move them apart (center_um, axis)",
-                    told_text(found.first), found.vertices));
+    throw InputError(fmt::format("surfaces cross: {}, by {} vertices, before the first step: move them apart (center_um, axis)",
+                                 told_text(found.first), found.vertices));
   note_gaps();
 }
 

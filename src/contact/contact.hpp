@@ -25,9 +25,9 @@ namespace corpuscle {
 /// The other ranks, where cells are shared out. Every rank makes the same calls.
 struct ContactPeers {
   Comm comm;
-  std::function<void()> update_copies;  // positions of this rank's cells to all their copies
+  std::function<void()> update_copies;                                   // positions of this rank's cells to all their copies
   std::shared_ptr<Workspace> workspace = std::make_shared<Workspace>();  // shared with others that do not use it while Contact does
-  GapsWanted gaps{};  // of copies
+  GapsWanted gaps{};                                                     // of copies
 };
 
 /// Of the lists' entries on a rank. @throws ComputationError  for more than an int counts
@@ -44,8 +44,8 @@ class Contact {
   /// @param images    shifts under which bodies are seen besides their own place; the identity first
   /// @param viscosity  mPa s, of the fluid between them
   /// @param blend_um  up to this gap to other bodies gaps() are wanted; 0 for none
-  Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity,
-          double blend_um, const ContactPeers* peers = nullptr);
+  Contact(const ContactSettings& settings, const SurfaceSet& surfaces, const Images& images, double viscosity, double blend_um,
+          const ContactPeers* peers = nullptr);
 
   /// The surfaces are others from now on: those of `set`, whose places are of the types of cells in `types` and, behind them, of the
   /// bodies `rigid`. look() must follow.
@@ -75,7 +75,8 @@ class Contact {
   /// Fastest rate at which aggregated membranes relax, 1/us; the repulsion adapts to the step.
   double fastest_relaxation_per_us() const;
 
-  /// [vertex] um to the nearest other body, rigid ones included, of look() or add_forces(), whichever was last; large where nothing is near.
+  /// [vertex] um to the nearest other body, rigid ones included, of look() or add_forces(), whichever was last; large where nothing is
+  /// near.
   const Array<double>& gaps() const { return gap_; }
   /// Energy of the contacts that look() saw, fJ, of those that count on this rank.
   double energy(double dt) const;
@@ -124,30 +125,30 @@ class Contact {
   double viscosity_;
   ContactReach reach_;  // without the skin
   ContactRest rest_;
-  TriangleBins bins_;  // in the workspace, as lists are made
-  TriangleSpheres spheres_;  // there: in the order of bins as lists are made, of triangles as contacts are found
+  TriangleBins bins_;           // in the workspace, as lists are made
+  TriangleSpheres spheres_;     // there: in the order of bins as lists are made, of triangles as contacts are found
   std::size_t items_room_ = 0;  // there, for items
   ContactLists lists_;
-  ContactViews now_;      // at the positions of look()
-  ContactViews ahead_;    // at those ahead; in the workspace
-  ContactPushes pushes_;  // there as well
-  Table<float> listed_;   // [vertex, 3] um, where the lists were made
-  double skin_ = -1;           // um; negative before there are lists
-  double wander_ = 0;          // um, that vertices may drift while lists hold
-  MotionSince together_;       // since lists were made
-  double steepest_ = 0;        // 1/us, gradient of that motion
-  double span_ = 0;            // um, from a vertex to the farthest corner of what is just beyond the lists
-  double step_ = 0;            // us, until the next look
-  double longest_way_ = 0;     // um, in a step, beyond the mean of all
-  Array<int> side_;            // [vertex]
-  Array<double> gap_;          // [vertex]
-  int movable_ = 0;            // vertices of cells
-  int own_ = 0;                // of those of this rank
+  ContactViews now_;        // at the positions of look()
+  ContactViews ahead_;      // at those ahead; in the workspace
+  ContactPushes pushes_;    // there as well
+  Table<float> listed_;     // [vertex, 3] um, where the lists were made
+  double skin_ = -1;        // um; negative before there are lists
+  double wander_ = 0;       // um, that vertices may drift while lists hold
+  MotionSince together_;    // since lists were made
+  double steepest_ = 0;     // 1/us, gradient of that motion
+  double span_ = 0;         // um, from a vertex to the farthest corner of what is just beyond the lists
+  double step_ = 0;         // us, until the next look
+  double longest_way_ = 0;  // um, in a step, beyond the mean of all
+  Array<int> side_;         // [vertex]
+  Array<double> gap_;       // [vertex]
+  int movable_ = 0;         // vertices of cells
+  int own_ = 0;             // of those of this rank
   std::optional<ContactPeers> peers_;
   std::shared_ptr<Workspace> workspace_;
   ContactReport report_;
-  int recurring_ = 0;      // steps with crossings, less those without since
-  bool crossed_ = false;   // since the last limit_approach()
+  int recurring_ = 0;     // steps with crossings, less those without since
+  bool crossed_ = false;  // since the last limit_approach()
 };
 
 }  // namespace corpuscle

@@ -15,7 +15,7 @@ namespace corpuscle {
 
 namespace {
 
-constexpr long told = 5;           // crossings that are told one by one
+constexpr long told = 5;            // crossings that are told one by one
 constexpr int most_recurring = 10;  // steps with crossings, less those without: what is put back goes through again
 
 template <class View>
@@ -28,9 +28,10 @@ auto host_of(const View& view) {
 int countable_items(std::int64_t items) {
   constexpr std::int64_t most = 2147483647;
   if (items > most)
-    throw ComputationError(fmt::format("contact: {:.3g} pairs of a vertex and a triangle on a rank, and {:.3g} are the most: use more "
-                                       "ranks, fewer cells, or a smaller contact.range_um",
-                                       static_cast<double>(items), static_cast<double>(most)));
+    throw ComputationError(
+        fmt::format("contact: {:.3g} pairs of a vertex and a triangle on a rank, and {:.3g} are the most: use more "
+                    "ranks, fewer cells, or a smaller contact.range_um",
+                    static_cast<double>(items), static_cast<double>(most)));
   return static_cast<int>(items);
 }
 
@@ -42,10 +43,11 @@ void Contact::refuse_far_away(const TriangleBounds& bounds) const {
   for (int d = 0; d < 3; ++d) furthest = std::max({furthest, -bounds.lower[d], bounds.upper[d]});
   const double apart = std::numeric_limits<float>::epsilon() * furthest;
   if (apart > share * settings_.range_um)
-    throw ComputationError(fmt::format("contact: a surface is {:.3g} um from the origin, where places are kept to {:.2g} um, too coarse for "
-                                       "contact.range_um = {:g}. Likely cause: a step too long for the flow, or a load without bound: reduce "
-                                       "time.step_us or the load, or move the grid to the origin",
-                                       furthest, apart, settings_.range_um));
+    throw ComputationError(
+        fmt::format("contact: a surface is {:.3g} um from the origin, where places are kept to {:.2g} um, too coarse for "
+                    "contact.range_um = {:g}. Likely cause: a step too long for the flow, or a load without bound: reduce "
+                    "time.step_us or the load, or move the grid to the origin",
+                    furthest, apart, settings_.range_um));
 }
 
 /// Before lists are made: they reach as far as anything may come from, and would take in all of a scene that flies apart.
@@ -58,11 +60,11 @@ StepWays Contact::refuse_runaways(double time, double dt) {
     const auto body = host_of(surface_.vertex_body);
     const auto first = host_of(surface_.first_vertex);
     const int cell = body(found.vertex);
-    return fmt::format("contact: {}, vertex {} at {} and {:.6g} us, goes {:.3g} um in a step of {:.3g} us, beyond the mean of all: more "
-                       "than a third of a cell's radius, {:.3g} um, so that there is no telling what it meets. Likely cause: a membrane "
-                       "that blows up, or a step too long for the load: reduce time.step_us or the load",
-                       body_name(surface_, cell), found.vertex - first(cell), place_text(found.vertex), time, found.way, dt,
-                       longest_way_);
+    return fmt::format(
+        "contact: {}, vertex {} at {} and {:.6g} us, goes {:.3g} um in a step of {:.3g} us, beyond the mean of all: more "
+        "than a third of a cell's radius, {:.3g} um, so that there is no telling what it meets. Likely cause: a membrane "
+        "that blows up, or a step too long for the load: reduce time.step_us or the load",
+        body_name(surface_, cell), found.vertex - first(cell), place_text(found.vertex), time, found.way, dt, longest_way_);
   });
   return all;
 }
@@ -74,10 +76,11 @@ void Contact::refuse_fast_passage(double time, double dt) {
   const double most = settings_.range_um;
   const LongestWay found = longest_passage(surface_, images_, lists_, own_, dt, most);
   refuse(found, most, [&] {
-    return fmt::format("contact: {} and {:.6g} us, go through each other, by {:.3g} um in a step of {:.3g} us, more than contact.range_um = {:g}: "
-                       "contact has no part in it. Likely cause: a step too long for the flow or the load, or a membrane that blows up: "
-                       "reduce time.step_us or the load",
-                       pair_text(found.vertex, found.item), time, found.way, dt, most);
+    return fmt::format(
+        "contact: {} and {:.6g} us, go through each other, by {:.3g} um in a step of {:.3g} us, more than contact.range_um = {:g}: "
+        "contact has no part in it. Likely cause: a step too long for the flow or the load, or a membrane that blows up: "
+        "reduce time.step_us or the load",
+        pair_text(found.vertex, found.item), time, found.way, dt, most);
   });
 }
 
@@ -121,8 +124,7 @@ void Contact::count_crossings(int vertices, int first, double time) {
                     "reduce the flow (the boundaries' velocities, fluid.pressure_gradient_Pa_per_um), the load (push_nN) or time.step_us, "
                     "raise contact.pressure_Pa, refine grid.nodes, or use more vertices (cells.vertices)",
                     told_text(first), time, vertices, recurring_));
-  if (report_.crossings < told)
-    warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
+  if (report_.crossings < told) warn("surfaces crossed: {}, at {:.6g} us; {} of their vertices put back", told_text(first), time, vertices);
   report_.crossings += vertices;
 }
 
@@ -144,11 +146,10 @@ std::string Contact::pair_text(int v, int item) const {
   const auto triangle_body = host_of(surface_.triangle_body);
   const int other = triangle_body(item_triangle(surface_, item));
   const std::string where = place_text(v);
-  if (item_image(surface_, item) == 0 && body(v) == other)
-    return fmt::format("{} with itself at {}", body_name(surface_, other), where);
+  if (item_image(surface_, item) == 0 && body(v) == other) return fmt::format("{} with itself at {}", body_name(surface_, other), where);
   const bool image = body_name(surface_, body(v)) == body_name(surface_, other);
-  return fmt::format("{} and {}{} at {}", body_name(surface_, body(v)), body_name(surface_, other),
-                     image ? " beyond a periodic side" : "", where);
+  return fmt::format("{} and {}{} at {}", body_name(surface_, body(v)), body_name(surface_, other), image ? " beyond a periodic side" : "",
+                     where);
 }
 
 /// On all ranks, of the lowest rank that has one.

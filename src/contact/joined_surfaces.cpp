@@ -107,8 +107,7 @@ void JoinedSurfaces::take_up(const SurfaceSet& cells, const SurfaceSet& template
   fill(type_, types);
   if (!set_.place_triangle.data()) join_tables(templates, rigid_, set_);
   if (set_.cells > 0) place_bodies(templates, type_, set_, 0, set_.cells);
-  if (set_.bodies > set_.cells)
-    place_bodies(rigid_, type_, set_, set_.cells, set_.bodies, {templates.vertices, templates.triangles});
+  if (set_.bodies > set_.cells) place_bodies(rigid_, type_, set_, set_.cells, set_.bodies, {templates.vertices, templates.triangles});
   Kokkos::deep_copy(images_.laps_then, images_.laps);
   update(cells);
 }
@@ -122,9 +121,7 @@ bool JoinedSurfaces::turned() const {
   return false;
 }
 
-void JoinedSurfaces::update(const SurfaceSet& cells) const {
-  join_positions(cells, rigid_, images_, set_);
-}
+void JoinedSurfaces::update(const SurfaceSet& cells) const { join_positions(cells, rigid_, images_, set_); }
 
 void JoinedSurfaces::give_back(const SurfaceSet& cells) const { copy_vertices(cells.own_vertices, set_.x, cells.x); }
 

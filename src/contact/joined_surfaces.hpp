@@ -34,7 +34,7 @@ class JoinedSurfaces {
   void make_room();
 
   SurfaceSet rigid_, set_;
-  std::vector<int> body_;                        // [image]
+  std::vector<int> body_;                              // [image]
   std::vector<int> rigid_vertices_, rigid_triangles_;  // [rigid body]
   RigidImages images_;
   Array<int> type_;  // [body] of a cell; of a rigid body its number

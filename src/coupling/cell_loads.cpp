@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "cells/rank_blocks.hpp"
-#include "coupling/periodic_frame.hpp"
 #include "core/error.hpp"
+#include "coupling/periodic_frame.hpp"
 #include "fluid/boundary_conditions.hpp"
 #include "parallel/agree.hpp"
 #include "transfer/vertex_forces.hpp"
@@ -67,16 +67,15 @@ std::vector<std::pair<int, Vec3>> images_of(const Case& scene, const SurfaceSet&
 
 }  // namespace
 
-bool CellLoads::wanted(const Case& scene) {
-  return scene.contact || std::any_of(scene.cells.begin(), scene.cells.end(), pushed);
-}
+bool CellLoads::wanted(const Case& scene) { return scene.contact || std::any_of(scene.cells.begin(), scene.cells.end(), pushed); }
 
 CellLoads::CellLoads(const Case& scene, SharedCells& cells, const Transfer& transfer, const Grid& grid, double viscosity,
                      std::shared_ptr<Workspace> workspace, ImmersedFlow* rigid)
     : cells_(cells), membranes_(cells.membranes()), comm_(cells.comm()), transfer_(transfer), workspace_(std::move(workspace)) {
   if (scene.contact) {
     const double blend = scene.coupling->slip ? slip_reach * comm_.max(transfer.largest_spacing()) : 0;
-    const ContactPeers peers{comm_, [this] {
+    const ContactPeers peers{comm_,
+                             [this] {
                                if (joined_) joined_->give_back(cells_.surfaces());
                                cells_.to_copies(cells_.surfaces().x, true);
                                follow_bodies();
@@ -113,9 +112,10 @@ void CellLoads::refuse_thin_blocks(double range) const {
       if (!walls_.wall[d][end] || !here || ends_too) continue;
       const double thickness = least_thickness(lattice, d, end);
       if (thickness < range)
-        wrong = fmt::format("contact.range_um = {:g}: the block of rank {} beside a wall is only {:.3g} um thick along {}, and the next "
-                            "one would not feel the wall: use fewer ranks, or a smaller contact.range_um",
-                            range, comm_.rank(), thickness, "ijk"[d]);
+        wrong = fmt::format(
+            "contact.range_um = {:g}: the block of rank {} beside a wall is only {:.3g} um thick along {}, and the next "
+            "one would not feel the wall: use fewer ranks, or a smaller contact.range_um",
+            range, comm_.rank(), thickness, "ijk"[d]);
     }
   wrong = agree(comm_, wrong);
   if (!wrong.empty()) throw InputError(wrong);

@@ -4,11 +4,11 @@
 #include <map>
 #include <optional>
 
+#include "cells/shared_cells.hpp"
 #include "contact/contact.hpp"
 #include "contact/joined_surfaces.hpp"
-#include "coupling/immersed_flow.hpp"
 #include "contact/wall_contact.hpp"
-#include "cells/shared_cells.hpp"
+#include "coupling/immersed_flow.hpp"
 #include "transfer/transfer.hpp"
 
 namespace corpuscle {
@@ -81,11 +81,11 @@ class CellLoads {
   std::unique_ptr<JoinedSurfaces> joined_;  // and rigid bodies
   bool bodies_move_ = false;                // through periodic sides
   WallSides walls_;
-  WallLinks links_;  // of this block
-  Components<double> force_;  // [vertex, 3] nN
+  WallLinks links_;                  // of this block
+  Components<double> force_;         // [vertex, 3] nN
   double smallest_wall_gap_ = 1e30;  // um
-  std::map<int, Triple> push_;  // nN, by the cell's number; of those that are pushed
-  Table<double> share_;         // [own cell, 3] nN; only if any is pushed
+  std::map<int, Triple> push_;       // nN, by the cell's number; of those that are pushed
+  Table<double> share_;              // [own cell, 3] nN; only if any is pushed
 };
 
 }  // namespace corpuscle

@@ -17,8 +17,8 @@ namespace corpuscle {
 
 /// Stability of the coupling, estimated before a step.
 struct StabilityEstimate {
-  double mass_term = 0;   // M / (A dt), pg/um2/us
-  double beta = 0;        // Robin coefficient in use, pg/um2/us
+  double mass_term = 0;              // M / (A dt), pg/um2/us
+  double beta = 0;                   // Robin coefficient in use, pg/um2/us
   double viscous = 0, inertial = 0;  // half the largest reactions of the fluid
   double threshold() const { return viscous > inertial ? viscous : inertial; }
   double margin() const { return (mass_term + beta) / threshold(); }

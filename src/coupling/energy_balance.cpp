@@ -102,8 +102,8 @@ void EnergyBalance::sample(double elastic_fJ) {
     state_.first = now;
   } else {
     const double half = 0.5 * (simulation_.time() - state_.time);
-    for (auto rate : {&EnergyTotals::boundaries, &EnergyTotals::gradient, &EnergyTotals::dissipation,
-                      &EnergyTotals::on_cells, &EnergyTotals::on_bodies, &EnergyTotals::pushed, &EnergyTotals::membrane_dissipation})
+    for (auto rate : {&EnergyTotals::boundaries, &EnergyTotals::gradient, &EnergyTotals::dissipation, &EnergyTotals::on_cells,
+                      &EnergyTotals::on_bodies, &EnergyTotals::pushed, &EnergyTotals::membrane_dissipation})
       state_.totals.*rate += half * (state_.rates.*rate + now.*rate);
     for (auto content : {&EnergyTotals::kinetic, &EnergyTotals::elastic, &EnergyTotals::contact, &EnergyTotals::membrane_kinetic})
       state_.totals.*content = now.*content - state_.first.*content;

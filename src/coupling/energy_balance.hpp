@@ -10,17 +10,17 @@ namespace corpuscle {
 
 /// Work done since the first sample and energy stored since then, fJ (1 nW for 1 us).
 struct EnergyTotals {
-  double boundaries = 0;             // in through the sides of the grid
-  double gradient = 0;               // by the imposed pressure gradient
-  double dissipation = 0;            // in the fluid, integral of 2 mu D : D
-  double kinetic = 0;                // change of the fluid's
-  double on_cells = 0;               // by tractions
-  double on_bodies = 0;              // by tractions and contacts, on those that move as prescribed
-  double pushed = 0;                 // on the cells by forces from outside
-  double elastic = 0;                // change of the membranes'
-  double contact = 0;                // change of that of contacts
+  double boundaries = 0;   // in through the sides of the grid
+  double gradient = 0;     // by the imposed pressure gradient
+  double dissipation = 0;  // in the fluid, integral of 2 mu D : D
+  double kinetic = 0;      // change of the fluid's
+  double on_cells = 0;     // by tractions
+  double on_bodies = 0;    // by tractions and contacts, on those that move as prescribed
+  double pushed = 0;       // on the cells by forces from outside
+  double elastic = 0;      // change of the membranes'
+  double contact = 0;      // change of that of contacts
   double membrane_dissipation = 0;
-  double membrane_kinetic = 0;       // change
+  double membrane_kinetic = 0;  // change
 };
 
 class EnergyBalance {

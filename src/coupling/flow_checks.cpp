@@ -20,10 +20,10 @@ using Type = BoundarySettings::Type;
 
 /// What one side lets through while its factor of time is 1.
 struct SideFlux {
-  Triple outward{};       // sum of the faces' area vectors, um2
-  double area = 0;        // um2
-  double through = 0;     // um3/us, sum of |v . n| over the faces, for a velocity that is a vector
-  double flux = 0;        // um3/us, out of the block
+  Triple outward{};    // sum of the faces' area vectors, um2
+  double area = 0;     // um2
+  double through = 0;  // um3/us, sum of |v . n| over the faces, for a velocity that is a vector
+  double flux = 0;     // um3/us, out of the block
 };
 
 Vec3 node(const Grid& grid, const int (&at)[3]) {
@@ -92,8 +92,7 @@ void check_moving_walls(const std::vector<BoundarySettings>& boundaries, const s
     throw InputError(fmt::format(
         "boundary.{}.velocity_mm_per_s = [{:.4g}, {:.4g}, {:.4g}]: a moving wall must not move through itself, and {} would "
         "with {:.3g} mm/s on average; give a velocity along the wall, or make the side a \"velocity_inlet\"",
-        b, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[b].side),
-        across / units::mm_per_s));
+        b, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[b].side), across / units::mm_per_s));
   }
 }
 
@@ -107,16 +106,16 @@ std::vector<double> corners_in_time(const std::vector<BoundarySettings>& boundar
   return times;
 }
 
-[[noreturn]] void refuse_net_flux(const std::vector<BoundarySettings>& boundaries, const std::vector<SideFlux>& sides,
-                                  double time, double net) {
+[[noreturn]] void refuse_net_flux(const std::vector<BoundarySettings>& boundaries, const std::vector<SideFlux>& sides, double time,
+                                  double net) {
   std::vector<std::string> parts;
   double steady = 0;
   int last = -1;
   for (std::size_t b = 0; b < boundaries.size(); ++b) {
     if (boundaries[b].type != Type::velocity_inlet) continue;
     const double flux = time_factor(boundaries[b], time) * sides[b].flux;
-    parts.push_back(fmt::format("{:.4g} um3/us {} through {} (boundary.{}.velocity_mm_per_s)", std::abs(flux),
-                                flux > 0 ? "out" : "in", name_of(boundaries[b].side), b));
+    parts.push_back(fmt::format("{:.4g} um3/us {} through {} (boundary.{}.velocity_mm_per_s)", std::abs(flux), flux > 0 ? "out" : "in",
+                                name_of(boundaries[b].side), b));
     steady += sides[b].flux;
     if (!boundaries[b].velocity) last = static_cast<int>(b);
   }
@@ -124,14 +123,14 @@ std::vector<double> corners_in_time(const std::vector<BoundarySettings>& boundar
   if (std::abs(steady) < 1e-3 * std::abs(net))
     remedy += ", or give them ramp_us and time_table that agree";
   else if (last >= 0)
-    remedy += fmt::format(", or let them cancel, for example with boundary.{}.velocity_mm_per_s = {:.6g}", last,
-                          (boundaries[last].speed + steady / std::hypot(sides[last].outward[0], sides[last].outward[1],
-                                                                        sides[last].outward[2])) /
-                              units::mm_per_s);
-  throw InputError(fmt::format(
-      "boundary: the prescribed velocities do not conserve volume: at {:.4g} us {}, a net flux of {:.4g} um3/us {} that has no "
-      "other way {}; {}",
-      time, fmt::join(parts, ", "), std::abs(net), net > 0 ? "out" : "in", net > 0 ? "in" : "out", remedy));
+    remedy +=
+        fmt::format(", or let them cancel, for example with boundary.{}.velocity_mm_per_s = {:.6g}", last,
+                    (boundaries[last].speed + steady / std::hypot(sides[last].outward[0], sides[last].outward[1], sides[last].outward[2])) /
+                        units::mm_per_s);
+  throw InputError(
+      fmt::format("boundary: the prescribed velocities do not conserve volume: at {:.4g} us {}, a net flux of {:.4g} um3/us {} that has no "
+                  "other way {}; {}",
+                  time, fmt::join(parts, ", "), std::abs(net), net > 0 ? "out" : "in", net > 0 ? "in" : "out", remedy));
 }
 
 }  // namespace
@@ -204,8 +203,8 @@ std::string check_wall_strain(const Grid& grid, const std::vector<BoundarySettin
       "strains the fluid and the cells in it by {:.3g} in a step of {:g} us; {:g} is the most that a cell{} follows well, more than {:g} "
       "is refused: lower boundary.{}.velocity_mm_per_s (is it in mm/s?), or reduce time.step_us to {:.2g} us or less",
       wall, v[0] / units::mm_per_s, v[1] / units::mm_per_s, v[2] / units::mm_per_s, name_of(boundaries[wall].side), apart,
-      speed / units::mm_per_s, worst, step_us, much,
-      viscous ? " whose membrane is viscous" : "", most, wall, 0.98 * step_us * much / worst);
+      speed / units::mm_per_s, worst, step_us, much, viscous ? " whose membrane is viscous" : "", most, wall,
+      0.98 * step_us * much / worst);
   if (worst > most) throw InputError(text);
   return text;
 }
@@ -260,13 +259,16 @@ void check_courses(const std::vector<BoundarySettings>& boundaries, const StepSc
     const auto& s = boundaries[b];
     const double first = schedule.step_us(0);
     if (s.ramp_us > 0 && s.ramp_us < first * (1 - 1e-9))
-      warn("boundary.{}.ramp_us = {:g}: the first step, of {:g} us, is longer: the same as no ramp; reduce time.first_step_us or "
-           "time.step_us to see it", b, s.ramp_us, first);
+      warn(
+          "boundary.{}.ramp_us = {:g}: the first step, of {:g} us, is longer: the same as no ramp; reduce time.first_step_us or "
+          "time.step_us to see it",
+          b, s.ramp_us, first);
     if (s.time_table.empty()) continue;
     if (s.time_table.back()[0] < first * (1 - 1e-9))
-      throw InputError(fmt::format("boundary.{}.time_table: all of its rows lie within the first step, of {:g} us: times are in us; "
-                                   "multiply those in seconds by 1e6, or reduce time.step_us",
-                                   b, first));
+      throw InputError(
+          fmt::format("boundary.{}.time_table: all of its rows lie within the first step, of {:g} us: times are in us; "
+                      "multiply those in seconds by 1e6, or reduce time.step_us",
+                      b, first));
     const int row = unseen_row(s, schedule);
     if (row < 0) continue;
     const double at = s.time_table[row][0];

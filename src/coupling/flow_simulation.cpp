@@ -43,9 +43,11 @@ void warn_of_free_fluid(const Case& scene) {
         return side.type != Type::periodic && side.type != Type::symmetry;
       }))
     return;
-  warn("fluid.pressure_gradient_Pa_per_um: with periodic or symmetry sides all round nothing holds the fluid: it goes ever faster, by {:.3g} "
-       "mm/s in every ms, and means of speeds are of how long the run is; give the grid a wall, or drive it by moving walls",
-       1e3 * gradient / scene.fluid->density_pg_per_um3);
+  warn(
+      "fluid.pressure_gradient_Pa_per_um: with periodic or symmetry sides all round nothing holds the fluid: it goes ever faster, by "
+      "{:.3g} "
+      "mm/s in every ms, and means of speeds are of how long the run is; give the grid a wall, or drive it by moving walls",
+      1e3 * gradient / scene.fluid->density_pg_per_um3);
 }
 
 /// Warns of cells that are to start drawn out to another volume.
@@ -56,9 +58,11 @@ void check_stretches(const Comm& comm, const Case& scene, Membranes& membranes) 
     const Triple& s = scene.cells[c].start_stretch;
     const double size = std::cbrt(s[0] * s[1] * s[2]);
     if (std::abs(size - 1) > unlike)
-      warn("cells.{}.start_stretch = [{:g}, {:g}, {:g}] is taken as [{:.3g}, {:.3g}, {:.3g}]: a cell that starts drawn out keeps its volume, so "
-           "only the ratios count (another size: scale)",
-           c, s[0], s[1], s[2], s[0] / size, s[1] / size, s[2] / size);
+      warn(
+          "cells.{}.start_stretch = [{:g}, {:g}, {:g}] is taken as [{:.3g}, {:.3g}, {:.3g}]: a cell that starts drawn out keeps its "
+          "volume, so "
+          "only the ratios count (another size: scale)",
+          c, s[0], s[1], s[2], s[0] / size, s[1] / size, s[2] / size);
   }
   const auto starts_drawn = [](const CellSettings& cell) { return cell.start_stretch != Triple{1, 1, 1}; };
   if (std::none_of(scene.cells.begin(), scene.cells.end(), starts_drawn)) return;
@@ -71,10 +75,10 @@ void check_stretches(const Comm& comm, const Case& scene, Membranes& membranes) 
     const double area = std::abs(cells[c].area_um2 / cells[c].rest_area_um2 - 1);
     if (area <= Membranes::senseless_area) continue;
     const Triple& stretch = scene.cells[number].start_stretch;
-    wrong = fmt::format("{}.start_stretch = [{:g}, {:g}, {:g}]: its membrane's area is {:.0f} % off that at rest then, a real one breaks at about "
-                        "{:.0f} %, and a run stops at {:.0f} %: draw the cell out less",
-                        membranes.name(cell), stretch[0], stretch[1], stretch[2], 100 * area, 100 * Membranes::lysis_area,
-                        100 * Membranes::senseless_area);
+    wrong = fmt::format(
+        "{}.start_stretch = [{:g}, {:g}, {:g}]: its membrane's area is {:.0f} % off that at rest then, a real one breaks at about "
+        "{:.0f} %, and a run stops at {:.0f} %: draw the cell out less",
+        membranes.name(cell), stretch[0], stretch[1], stretch[2], 100 * area, 100 * Membranes::lysis_area, 100 * Membranes::senseless_area);
   }
   wrong = agree(comm, wrong);
   if (!wrong.empty()) throw InputError(wrong);
@@ -95,7 +99,8 @@ FlowSimulation::FlowSimulation(const Comm& comm, const Case& scene, Timers& time
   // After the coupling, which refuses what its membranes do not stand: that is the shorter step, and another remedy.
   if (scene.has_cells()) {
     const bool viscous = coupling_->shared_cells() && membranes()->viscosity();
-    if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back(), viscous); !text.empty()) warn("{}", text);
+    if (const auto text = check_wall_strain(*grid_, scene.boundaries, schedule_.lengths_us().back(), viscous); !text.empty())
+      warn("{}", text);
   }
   if (!membranes()) return;
   check_stretches(comm, scene, *membranes());
@@ -125,12 +130,16 @@ std::string FlowSimulation::outflow_message() const {
 void FlowSimulation::resume(const Progress& progress) {
   tick_ = schedule_.tick_at(progress.time);
   if (tick_ < 0)
-    throw InputError(fmt::format("no step of this case begins at {} us, where the checkpoint is: use another time.step_us or "
-                                 "time.first_step_us", progress.time));
+    throw InputError(
+        fmt::format("no step of this case begins at {} us, where the checkpoint is: use another time.step_us or "
+                    "time.first_step_us",
+                    progress.time));
   constexpr double most = 2;  // beyond 1 + sqrt(2), errors of second-order backward differences grow (Hairer et al., III.5)
   if (progress.steps > 0 && next_step_us() > most * progress.last_step * (1 + 1e-9))
-    throw InputError(fmt::format("the step can at most double at a restart: the checkpoint was written with steps of {} us, and "
-                                 "this case goes on with {} us; reduce time.step_us", progress.last_step, next_step_us()));
+    throw InputError(
+        fmt::format("the step can at most double at a restart: the checkpoint was written with steps of {} us, and "
+                    "this case goes on with {} us; reduce time.step_us",
+                    progress.last_step, next_step_us()));
   time_ = schedule_.time_us(tick_);
   last_step_ = progress.last_step;
   steps_ = progress.steps;

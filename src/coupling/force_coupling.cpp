@@ -41,8 +41,7 @@ double contact_reach(const Case& scene, const Grid& grid) {
 
 }  // namespace
 
-ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers,
-                             const PackedCells* packed)
+ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers, const PackedCells* packed)
     : scene_(without_cells(scene)),
       fluid_(fluid),
       timers_(timers),
@@ -51,8 +50,7 @@ ForceCoupling::ForceCoupling(const Case& scene, const StepSchedule& schedule, Fl
       workspace_(std::make_shared<Workspace>()),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
   take_places(scene, packed, contact_reach(scene, fluid.grid()));
-  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices,
-                                         workspace_);
+  transfer_ = std::make_unique<Transfer>(fluid.grid(), scene.boundaries, scene.coupling->kernel, surfaces().vertices, workspace_);
   if (sharp_pressure()) transfer_->sharpen_pressure();
   if (!scene.bodies.empty()) {
     bodies_ = std::make_unique<SharpCoupling>(scene_, fluid, timers, nullptr);
@@ -90,8 +88,8 @@ std::string ForceCoupling::vertex_text(int vertex) const {
   const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), set.x);
   int cell = 0;
   while (cell + 1 < set.cells && first(cell + 1) <= vertex) ++cell;
-  return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(set, cell), vertex - first(cell), x(vertex, 0),
-                     x(vertex, 1), x(vertex, 2));
+  return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(set, cell), vertex - first(cell), x(vertex, 0), x(vertex, 1),
+                     x(vertex, 2));
 }
 
 /// Where the vertices are in the grid.
@@ -328,7 +326,8 @@ CellEnergy ForceCoupling::energy_of_cells(double dt_us) {
   const auto moves = [](const BoundarySettings& b) { return b.type == BoundarySettings::Type::moving_wall; };
   if (std::any_of(scene_.boundaries.begin(), scene_.boundaries.end(), moves))
     energy.on_sides = transfer_->power_on_sides(forces(), fluid_.velocity(), has_slip ? &slip : nullptr);
-  energy.unresolved = face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
+  energy.unresolved =
+      face_loss(fluid_.grid().views(), fluid_.kind(), transfer_->faces(), fluid_.flux(), fluid_.velocity(), fluid_.pressure());
   if (has_slip) energy.unresolved += slip_power(transfer_->block(), slip, transfer_->views());
   const double beside_bodies = loss_beside_bodies();  // of all ranks
   if (fluid_.grid().comm().rank() == 0) energy.unresolved += beside_bodies;

@@ -109,7 +109,7 @@ class ForceCoupling : public Coupling {
   double second_order_share() const;
   using Kind = std::pair<int, Triple>;  // type, and by how much a cell starts drawn out
   struct Spacings {
-    double narrowest = 1e30, widest = 0;   // um
+    double narrowest = 1e30, widest = 0;    // um
     std::vector<std::vector<int>> numbers;  // [kind] of the cells that stand for it
   };
   std::vector<std::pair<double, double>> mean_spacings();
@@ -131,25 +131,25 @@ class ForceCoupling : public Coupling {
   std::shared_ptr<Workspace> workspace_;
   std::unique_ptr<SharedCells> cells_;
   std::unique_ptr<SharpCoupling> bodies_;  // rigid ones, and the flow around them; null without any
-  std::optional<PackingReport> packing_;  // only with populations
+  std::optional<PackingReport> packing_;   // only with populations
   std::optional<PackedShare> packed_;
-  double asked_gap_ = 0;                  // um, the least of the populations'
-  double packed_gap_ = 0;                 // um, that which they must have
-  bool packed_in_box_ = false;            // some are to start within one
-  int packed_listed_ = 0;                 // cells of the scene that are not packed
-  double small_stable_us_ = 0;            // stable_us_, short_waves_ and held_rate_ of packed cells before they have grown
+  double asked_gap_ = 0;        // um, the least of the populations'
+  double packed_gap_ = 0;       // um, that which they must have
+  bool packed_in_box_ = false;  // some are to start within one
+  int packed_listed_ = 0;       // cells of the scene that are not packed
+  double small_stable_us_ = 0;  // stable_us_, short_waves_ and held_rate_ of packed cells before they have grown
   double small_short_waves_ = 0, small_held_rate_ = 0;
-  bool grows_ = false;                    // packed cells are still smaller than they are to be, and must grow
-  bool small_ = false;                    // or are about to be replaced by those of a checkpoint
-  Membranes* membranes_;                        // theirs
+  bool grows_ = false;    // packed cells are still smaller than they are to be, and must grow
+  bool small_ = false;    // or are about to be replaced by those of a checkpoint
+  Membranes* membranes_;  // theirs
   std::unique_ptr<Transfer> transfer_;
-  Components<double> traction_;                 // [vertex, 3] kPa, in the workspace
-  std::unique_ptr<Cytosol> cytosol_;            // only where it is not as viscous as the fluid outside
-  Components<double> followed_;                 // [vertex, 1] share of the forces that slip follows; only with slip
-  std::unique_ptr<CellLoads> loads_;            // only where something else than membranes acts on them
-  std::map<int, Kind> drawn_out_;  // by number, cells that start so, until the start has been checked
-  double quiet_speed_;        // um/us: what counts as rest
-  std::string coarse_;        // which cells the grid resolves coarsely
+  Components<double> traction_;       // [vertex, 3] kPa, in the workspace
+  std::unique_ptr<Cytosol> cytosol_;  // only where it is not as viscous as the fluid outside
+  Components<double> followed_;       // [vertex, 1] share of the forces that slip follows; only with slip
+  std::unique_ptr<CellLoads> loads_;  // only where something else than membranes acts on them
+  std::map<int, Kind> drawn_out_;     // by number, cells that start so, until the start has been checked
+  double quiet_speed_;                // um/us: what counts as rest
+  std::string coarse_;                // which cells the grid resolves coarsely
   /// What the fluid resists least, for cells with membrane viscosity; area: um2, of all.
   struct Softest {
     double area = 0, radius = 0, wave_number_square = 0;

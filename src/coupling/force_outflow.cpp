@@ -15,8 +15,7 @@ void ForceCoupling::watch_outflow() {
   for (const auto& boundary : scene_.boundaries) {
     const int side = static_cast<int>(boundary.side), d = side / 2, end = side % 2;
     const auto& lattice = transfer_->block().lattice;
-    if (boundary.type != BoundarySettings::Type::outflow || !(end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d]))
-      continue;
+    if (boundary.type != BoundarySettings::Type::outflow || !(end == 0 ? lattice.boundary_below[d] : lattice.boundary_above[d])) continue;
     const NearSide near = nearest_to_side(transfer_->block(), transfer_->views(), d, end);
     if (near.distance < outflow_.distance) outflow_ = near;
   }

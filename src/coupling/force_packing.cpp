@@ -115,22 +115,23 @@ void ForceCoupling::check_packing() {
   contact.take_up(surfaces(), membranes_->templates());
   contact.look_at_start(lengths_us_.front());
   packing_->gaps_seen_um = settings.range_um;
-  packing_->smallest_gap_um =
-      comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
+  packing_->smallest_gap_um = comm.min(least_gap_of_packed(surfaces(), contact.lists(), contact.contacts(), packed_listed_));
   const WallSides sides = walls_of(scene_.boundaries);
   const double to_side =
       sides.any() ? least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), settings.range_um}) : 1e30;
   packing_->smallest_wall_gap_um = comm.min(to_side);
   const double least = std::min(packing_->smallest_gap_um, packing_->smallest_wall_gap_um + rounded);
   if (least >= packed_gap_ && least < asked_gap_)
-    warn("populations: gap_um = {:g} is asked for, and cells that have grown as membranes keep what contact leaves them: the nearest are {} from "
-         "each other and {} from a wall. Ask for fewer cells (hematocrit, count), or for a smaller gap_um",
-         asked_gap_, gap_text(packing_->smallest_gap_um, settings.range_um), gap_text(packing_->smallest_wall_gap_um, settings.range_um));
+    warn(
+        "populations: gap_um = {:g} is asked for, and cells that have grown as membranes keep what contact leaves them: the nearest are {} "
+        "from "
+        "each other and {} from a wall. Ask for fewer cells (hematocrit, count), or for a smaller gap_um",
+        asked_gap_, gap_text(packing_->smallest_gap_um, settings.range_um), gap_text(packing_->smallest_wall_gap_um, settings.range_um));
   if (least >= packed_gap_) return;
-  throw InputError(fmt::format("populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "
-                               "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
-                               gap_text(packing_->smallest_gap_um, settings.range_um),
-                               gap_text(packing_->smallest_wall_gap_um, settings.range_um), packed_gap_));
+  throw InputError(fmt::format(
+      "populations: the nearest cells are {} from each other and {} from a wall, and gap_um = {:g} is asked "
+      "for: packing them has failed; use another seed, a larger gap_um, or meshes with more vertices",
+      gap_text(packing_->smallest_gap_um, settings.range_um), gap_text(packing_->smallest_wall_gap_um, settings.range_um), packed_gap_));
 }
 
 /// Where shapes at rest have no room, membranes grow to their size from the largest that have, as contact and their own forces
@@ -142,8 +143,10 @@ void ForceCoupling::inflate() {
   double size = packed_->size, mobility = 0;
   info("packing:  shapes at rest fit with {:.3f} of their size; they grow on as membranes", size);
   if (packed_in_box_)
-    warn("populations: lower_um and upper_um hold shapes, not membranes as they grow: cells may start beyond the box by as much as the others "
-         "push them; ask for fewer (hematocrit, count) or for a larger box to have them all within it");
+    warn(
+        "populations: lower_um and upper_um hold shapes, not membranes as they grow: cells may start beyond the box by as much as the "
+        "others "
+        "push them; ask for fewer (hematocrit, count) or for a larger box to have them all within it");
   const auto still = [this] { Kokkos::deep_copy(surfaces().v, 0.0); };
   try {
     membranes_->rest_at_size(size);
@@ -162,9 +165,10 @@ void ForceCoupling::inflate() {
     }
     for (int n = 0; n < settling; ++n) settle_membranes(1, mobility, ++step);
   } catch (const ComputationError& error) {
-    throw InputError(fmt::format("populations: the cells do not fit, even as membranes that bend: at {:.3f} of their size, which is hematocrit "
-                                 "{:.3f} of {:.3f}, {}; ask for less, or for a wider grid",
-                                 size, packing_->tube_hematocrit * size * size * size, packing_->tube_hematocrit, error.what()));
+    throw InputError(
+        fmt::format("populations: the cells do not fit, even as membranes that bend: at {:.3f} of their size, which is hematocrit "
+                    "{:.3f} of {:.3f}, {}; ask for less, or for a wider grid",
+                    size, packing_->tube_hematocrit * size * size * size, packing_->tube_hematocrit, error.what()));
   }
   still();
   membranes_->rest_at_size(1);

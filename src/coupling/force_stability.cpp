@@ -20,8 +20,8 @@ namespace {
 double mean_spacing(const Grid& grid, int d) {
   const IndexSpace index = grid.index();
   const Components<double> area = grid.views().face_area[d];
-  const double swept = sum_owned("corpuscle::coupling::swept_area", index,
-                                 KOKKOS_LAMBDA(int i, int j, int k) { return norm(load(area, index.cell(i, j, k))); });
+  const double swept = sum_owned(
+      "corpuscle::coupling::swept_area", index, KOKKOS_LAMBDA(int i, int j, int k) { return norm(load(area, index.cell(i, j, k))); });
   return grid.total_volume() / grid.comm().sum(swept);
 }
 
@@ -49,13 +49,14 @@ void ForceCoupling::refuse_long_steps() {
   throw InputError(
       fmt::format("time.step_us: steps of {:.5g} us are too long for these membranes, which move with the fluid: above about "
                   "{} us{} {} would swing and grow. Reduce time.step_us{}",
-                  longest, rounded_down(allowed), scene_.coupling->slip ? " with the slip correction" : "", least_stable_.empty() ? "they" : least_stable_,
+                  longest, rounded_down(allowed), scene_.coupling->slip ? " with the slip correction" : "",
+                  least_stable_.empty() ? "they" : least_stable_,
                   scene_.coupling->slip ? "; without it they may be longer (coupling.slip = false)" : ""));
 }
 
-/// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on. With slip spheres and red cells of
-/// 0.4 to 1.2 spacings an edge are sound up to 0.64 and grow from 0.73; without it, where the estimate of short waves has less to spare, they
-/// are sound up to 0.50 and grow from 0.54 to 0.59.
+/// Of the largest stable step: up to there steps are of second order, which swing from two thirds of it on. With slip spheres and red cells
+/// of 0.4 to 1.2 spacings an edge are sound up to 0.64 and grow from 0.73; without it, where the estimate of short waves has less to spare,
+/// they are sound up to 0.50 and grow from 0.54 to 0.59.
 double ForceCoupling::second_order_share() const { return scene_.coupling->slip ? 0.6 : 0.45; }
 
 /// Forces and velocities are those at the step's end, where the last velocities bring the membranes, which then move by the
@@ -106,8 +107,9 @@ ForceCoupling::Kind ForceCoupling::kind_of(const CellRecord& cell) const {
   return found == drawn_out_.end() ? Kind{cell.type, {1, 1, 1}} : found->second;
 }
 
-/// Of each of this rank's cells the least and the largest of what the grid's spacings along a direction, um, are over its vertices in the mean: the
-/// narrowest that a cell of a tube reaches have too little say to be waited for, but where all of them are narrow, as inside a bend, that cell is.
+/// Of each of this rank's cells the least and the largest of what the grid's spacings along a direction, um, are over its vertices in the
+/// mean: the narrowest that a cell of a tube reaches have too little say to be waited for, but where all of them are narrow, as inside a
+/// bend, that cell is.
 std::vector<std::pair<double, double>> ForceCoupling::mean_spacings() {
   const Components<double> spacings("corpuscle::coupling::spacings", surfaces().vertices, 3);
   spacings_at(transfer_->block(), transfer_->views(), spacings);
@@ -126,8 +128,8 @@ std::vector<std::pair<double, double>> ForceCoupling::mean_spacings() {
   return of_cell;
 }
 
-/// Slip grows with the spacing: of each kind the first cell, that in the narrowest and that in the widest spacings stand for all, the same ones on
-/// any number of ranks.
+/// Slip grows with the spacing: of each kind the first cell, that in the narrowest and that in the widest spacings stand for all, the same
+/// ones on any number of ranks.
 ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
   constexpr double rounding = 1e-9, none = std::numeric_limits<int>::max();
   const auto& own = cells_->own();
@@ -162,10 +164,11 @@ ForceCoupling::Spacings ForceCoupling::spacings_of_cells() {
 /// The rate is that of mobility times stiffness: the vertices' hydrodynamic interaction in an unbounded fluid, smeared over the
 /// kernel, and the slip, which has no interaction and is largest for the finest modes. A quarter less, since a load stiffens the
 /// membrane: two cells pressed together broke within 24 steps as long as the estimate, and within 68 of 0.9 times that. Dipoles of
-/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane viscosity
-/// lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to 1e-6 N s/m, in
-/// which bending, that it does not resist, and stretching act together, with slip all were sound at 0.02 of that and one grew slowly at 0.03: a
-/// fiftieth of it counts, where that is more than what they stand without. Each kind of cell by itself: some may have no viscosity.
+/// one plane wave give half a spacing; capsules of a tenth to a fifth of the viscosity outside swing as if they gave two. Membrane
+/// viscosity lets steps be up to 1500 times as long, as far as plane waves go; of spheres of 5 to 1000 uN/m, 1e-18 to 2e-16 J and 1e-8 to
+/// 1e-6 N s/m, in which bending, that it does not resist, and stretching act together, with slip all were sound at 0.02 of that and one
+/// grew slowly at 0.03: a fiftieth of it counts, where that is more than what they stand without. Each kind of cell by itself: some may
+/// have no viscosity.
 /// @param longest_us  of the steps, which the fluid's resistance depends on
 void ForceCoupling::measure_stability(double longest_us) {
   constexpr double limit = 1.5, of_dipoles = 2, of_viscous = 50;
@@ -213,7 +216,8 @@ void ForceCoupling::measure_stability(double longest_us) {
 std::string ForceCoupling::stability_text(double dt) const {
   const double longest = *std::max_element(lengths_us_.begin(), lengths_us_.end());
   const auto order = [this](double step) { return second_order(step) ? "second" : "first"; };
-  const std::string steps = longest > dt ? fmt::format("steps of {:.3g} us, of {} order, and up to {:.3g} us, of {} order", dt, order(dt), longest, order(longest))
+  const std::string steps = longest > dt ? fmt::format("steps of {:.3g} us, of {} order, and up to {:.3g} us, of {} order", dt, order(dt),
+                                                       longest, order(longest))
                                          : fmt::format("steps of {:.3g} us, of {} order", dt, order(dt));
   return fmt::format("coupling: {}; membranes that move with the fluid are stable up to about {} us{}", steps, rounded_down(stable_us_),
                      scene_.coupling->slip ? " with the slip correction (coupling.slip)" : "");

@@ -36,27 +36,29 @@ void ForceCoupling::warn_of_walls() const {
   if (!sides.any()) return;
   const Comm& comm = fluid_.grid().comm();
   const double spacing = fluid_.grid().mean_spacing();
-  const double least =
-      comm.min(least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), near * spacing}));
+  const double least = comm.min(least_wall_gap({transfer_->block().lattice, transfer_->views(), sides, surfaces(), near * spacing}));
   if (least < near * spacing)
-    warn("a cell starts {:.2g} um from a wall, {:.2g} spacings of the grid, and there is no [contact]: nothing resolves the film between "
-         "them, and that the cell goes through the wall would be seen late; add [contact], move the cell (center_um), or refine the grid "
-         "(grid.nodes)",
-         least, least / spacing);
+    warn(
+        "a cell starts {:.2g} um from a wall, {:.2g} spacings of the grid, and there is no [contact]: nothing resolves the film between "
+        "them, and that the cell goes through the wall would be seen late; add [contact], move the cell (center_um), or refine the grid "
+        "(grid.nodes)",
+        least, least / spacing);
 }
 
 /// Fluids as different as these, side by side in few spacings, are not resolved as well as others.
 void ForceCoupling::warn_of_ratios() const {
   constexpr double least = 0.35, most = 10;  // a sphere of three spacings, held: 14 and 13 % too much
-  std::vector<double> told;  // once, of however many types
+  std::vector<double> told;                  // once, of however many types
   for (const CellReference& type : membranes_->types()) {
     const double ratio = type.viscosity_ratio;
     if ((ratio >= least && ratio <= most) || std::find(told.begin(), told.end(), ratio) != told.end()) continue;
     told.push_back(ratio);
-    warn("viscosity_ratio = {:g}: cells that hardly deform resist the flow too much around a fluid that is {}: a sphere of three spacings of the "
-         "grid a radius adds {} too much to the viscosity, one of five {}; compare with a finer grid (grid.nodes)",
-         ratio, ratio < least ? "a third as viscous as that outside or less" : "more than ten times as viscous",
-         ratio < least ? "a fifth to a third" : "a quarter to a half", ratio < least ? "a tenth to a sixth" : "a tenth to a fifth");
+    warn(
+        "viscosity_ratio = {:g}: cells that hardly deform resist the flow too much around a fluid that is {}: a sphere of three spacings "
+        "of the "
+        "grid a radius adds {} too much to the viscosity, one of five {}; compare with a finer grid (grid.nodes)",
+        ratio, ratio < least ? "a third as viscous as that outside or less" : "more than ten times as viscous",
+        ratio < least ? "a fifth to a third" : "a quarter to a half", ratio < least ? "a tenth to a sixth" : "a tenth to a fifth");
   }
 }
 
@@ -76,9 +78,10 @@ void ForceCoupling::warn_of_image() const {
       low = std::min(low, along), high = std::max(high, along);
     }
     if (length - (high - low) < near * (high - low))
-      text = fmt::format("{} is {:.3g} um from its own image beyond a periodic side, and there is no [contact]: that they cross would "
-                         "not be seen; add [contact], or use a larger grid",
-                         body_name(surfaces(), 0), length - (high - low));
+      text = fmt::format(
+          "{} is {:.3g} um from its own image beyond a periodic side, and there is no [contact]: that they cross would "
+          "not be seen; add [contact], or use a larger grid",
+          body_name(surfaces(), 0), length - (high - low));
   }
   text = agree(fluid_.grid().comm(), text);
   if (!text.empty()) warn("{}", text);
@@ -98,10 +101,11 @@ void ForceCoupling::warn_of_pressed_start() const {
   const double contact = comm.sum(loads_->contact_energy(lengths_us_.front()));
   if (!(contact > much * elastic)) return;
   const ContactReport report = *loads_->report();
-  warn("contact: cells start pressed against each other or against walls, with gaps down to {:.2g} um: contact gives off up to {:.3g} fJ, "
-       "{:.2g} of the membranes' shear modulus times their area, which moves cells and fluid until it is spent: lower contact.range_um "
-       "or contact.pressure_Pa, start them farther apart (populations.0.gap_um, center_um), or begin to measure later (blood.from_us)",
-       report.smallest(), contact, contact / elastic);
+  warn(
+      "contact: cells start pressed against each other or against walls, with gaps down to {:.2g} um: contact gives off up to {:.3g} fJ, "
+      "{:.2g} of the membranes' shear modulus times their area, which moves cells and fluid until it is spent: lower contact.range_um "
+      "or contact.pressure_Pa, start them farther apart (populations.0.gap_um, center_um), or begin to measure later (blood.from_us)",
+      report.smallest(), contact, contact / elastic);
 }
 
 }  // namespace corpuscle

@@ -53,9 +53,9 @@ int ImmersedFlow::first_unowned_vertex() {
 void ImmersedFlow::check_positions(double smallest_gap) {
   const auto& counts = boundary_->counts();
   const Comm& comm = fluid_.grid().comm();
-  double worst[6] = {static_cast<double>(counts.lost_vertex), -counts.wall_spacings,
+  double worst[6] = {static_cast<double>(counts.lost_vertex),   -counts.wall_spacings,
                      static_cast<double>(counts.crossed_links), -counts.body_spacings,
-                     static_cast<double>(counts.uncovered), -counts.outflow_um};
+                     static_cast<double>(counts.uncovered),     -counts.outflow_um};
   comm.max(worst, 6);
   any_uncovered_ = worst[4] > 0;
   const double to_wall = -worst[1], between = -worst[3];
@@ -63,9 +63,8 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   outflow_vertex_ = counts.outflow_um == outflow_um_ ? counts.outflow_vertex : -1;
   report_.least_wall_spacings = smaller(report_.least_wall_spacings, to_wall);
   report_.least_body_spacings = smaller(report_.least_body_spacings, between);
-  double sums[5] = {static_cast<double>(counts.owned_vertices), static_cast<double>(counts.immersed),
-                    static_cast<double>(counts.inside), static_cast<double>(counts.isolated),
-                    static_cast<double>(counts.uncovered)};
+  double sums[5] = {static_cast<double>(counts.owned_vertices), static_cast<double>(counts.immersed), static_cast<double>(counts.inside),
+                    static_cast<double>(counts.isolated), static_cast<double>(counts.uncovered)};
   comm.sum(sums, 5);
   const long found = std::lround(sums[0]);
   report_.classifications += 1;
@@ -76,10 +75,10 @@ void ImmersedFlow::check_positions(double smallest_gap) {
   int vertex = static_cast<int>(worst[0]);
   if (vertex >= 0 || found < surfaces_.vertices) {
     if (vertex < 0) vertex = first_unowned_vertex();
-    throw ComputationError(fmt::format(
-        "position: {} lies outside the grid. Likely cause: it was placed there, has reached the end of the grid, "
-        "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
-        boundary_->describe_vertex(vertex)));
+    throw ComputationError(
+        fmt::format("position: {} lies outside the grid. Likely cause: it was placed there, has reached the end of the grid, "
+                    "or was pushed through a wall; change its center_um, use a longer grid, or end the run earlier (time.end_us)",
+                    boundary_->describe_vertex(vertex)));
   }
   if (to_wall < smallest_gap) {
     const bool here = counts.wall_spacings == to_wall;
@@ -89,13 +88,13 @@ void ImmersedFlow::check_positions(double smallest_gap) {
     const bool wall = what == "a wall";
     const std::string named = boundary_->describe_vertex(vertex);
     const bool rigid = named.rfind("bodies.", 0) == 0;
-    throw ComputationError(fmt::format(
-        "gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
-        "them.{} Move or tilt the {} (center_um, axis), refine the grid (grid.nodes) or use a {}",
-        wall ? "the wall" : "a side", named, to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)), smallest_gap,
-        wall ? "film" : "flow",
-        wall && !rigid ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "",
-        rigid ? "body" : "cell", wall ? "wider channel" : "larger grid"));
+    throw ComputationError(
+        fmt::format("gap to {}: {} is {:.2f} grid spacings from {} ({}), and {:.2f} are needed to resolve the {} between "
+                    "them.{} Move or tilt the {} (center_um, axis), refine the grid (grid.nodes) or use a {}",
+                    wall ? "the wall" : "a side", named, to_wall, what, name_of(static_cast<BoundarySettings::Side>(side)), smallest_gap,
+                    wall ? "film" : "flow",
+                    wall && !rigid ? " Contact with walls is only of membranes that are forces (coupling.scheme = \"force\")." : "",
+                    rigid ? "body" : "cell", wall ? "wider channel" : "larger grid"));
   }
   check_clearance(static_cast<int>(worst[2]), between, smallest_gap);
 }
@@ -114,10 +113,10 @@ void ImmersedFlow::check_clearance(int crossed, double between, double smallest_
           "its surface file, use more vertices, or refine the grid (grid.nodes)",
           inside, where));
     if (alone)
-      throw ComputationError(fmt::format(
-          "surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "
-          "or a step too long (time.step_us)",
-          inside, where));
+      throw ComputationError(
+          fmt::format("surfaces cross: {} passes through itself near {}. Likely cause: a fold too sharp for its mesh (cells.vertices), "
+                      "or a step too long (time.step_us)",
+                      inside, where));
     throw ComputationError(fmt::format(
         "surfaces cross: {} and {} overlap near {}. Contact forces are only between membranes that are forces (coupling.scheme = "
         "\"force\", [contact]): move them apart (center_um, axis) or end the run before they meet (time.end_us)",
@@ -159,8 +158,7 @@ void ImmersedFlow::check_resolution() {
     const long nodes = fluid_.grid().comm().sum(static_cast<long>(counts.body_immersed[b] + counts.body_inside[b]));
     if (nodes == 0)
       throw ComputationError(fmt::format(
-          "{}: no grid node lies in or next to it, so the flow does not see it: refine the grid (grid.nodes)",
-          body_name(surfaces_, b)));
+          "{}: no grid node lies in or next to it, so the flow does not see it: refine the grid (grid.nodes)", body_name(surfaces_, b)));
   }
 }
 
@@ -178,8 +176,7 @@ void ImmersedFlow::update_geometry(double smallest_gap) {
   boundary_->find_faces();
   boundary_->build_stencils();
   const auto& counts = boundary_->counts();
-  for (int kind = static_cast<int>(RowKind::least_squares); kind < row_kinds; ++kind)
-    own_velocity_fallbacks_ += counts.velocity_rows[kind];
+  for (int kind = static_cast<int>(RowKind::least_squares); kind < row_kinds; ++kind) own_velocity_fallbacks_ += counts.velocity_rows[kind];
   bodies_.rows = counts.immersed;
   bodies_.velocity = boundary_->velocity_stencils();
   bodies_.pressure = boundary_->pressure_stencils();
@@ -232,8 +229,7 @@ void ImmersedFlow::solve(double time) {
     const auto scope = timers_.scope("search");
     boundary_->update_surface_velocity();
     body_growth(surfaces_, bodies_.growth, mean_velocity_);
-    fill_inside_velocity(fluid_.grid().index(), surfaces_, boundary_->band(), boundary_->nodes(), mean_velocity_,
-                         fluid_.velocity());
+    fill_inside_velocity(fluid_.grid().index(), surfaces_, boundary_->band(), boundary_->nodes(), mean_velocity_, fluid_.velocity());
   }
   fluid_.solve(time, &bodies_);
 }

@@ -16,8 +16,8 @@ namespace corpuscle {
 struct ImmersedReport {
   long classifications = 0;
   long immersed = 0, inside = 0, isolated = 0;
-  long uncovered = 0;               // nodes that came out of a body, over the run
-  long velocity_fallbacks = 0;      // rows worse than one probe, over the run
+  long uncovered = 0;           // nodes that came out of a body, over the run
+  long velocity_fallbacks = 0;  // rows worse than one probe, over the run
   double least_wall_spacings = 1e30;
   double least_body_spacings = 1e30;  // between two bodies
 };
@@ -110,11 +110,11 @@ class ImmersedFlow {
   Components<double> traction_;
   HostCopy<Components<double>> found_host_;
   Components<double> x_classified_;  // [vertex, 3] um, at the last classification
-  double outflow_um_ = 1e30;  // of all ranks
-  int outflow_vertex_ = -1;   // if it is this rank that sees it
+  double outflow_um_ = 1e30;         // of all ranks
+  int outflow_vertex_ = -1;          // if it is this rank that sees it
   int unseen_vertex_ = no_vertex;
   ImmersedReport report_;
-  bool any_uncovered_ = false;  // on any rank, at the last classification
+  bool any_uncovered_ = false;       // on any rank, at the last classification
   long own_velocity_fallbacks_ = 0;  // of this rank, not yet in report_
 };
 

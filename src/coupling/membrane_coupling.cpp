@@ -37,8 +37,7 @@ double negligible_speed(const Case& scene, double viscosity) {
 }
 
 MembraneCoupling::MembraneCoupling(const Case& scene, FluidSolver& fluid, Timers& timers)
-    : SharpCoupling(scene, fluid, timers,
-                    std::make_unique<Membranes>(scene.cells, body_meshes(scene, fluid.grid()))),
+    : SharpCoupling(scene, fluid, timers, std::make_unique<Membranes>(scene.cells, body_meshes(scene, fluid.grid()))),
       quiet_speed_(negligible_speed(scene, fluid.viscosity())) {
   fluid_.raise_reference_speed(quiet_speed_);
   const int vertices = membranes_->vertices();
@@ -58,8 +57,8 @@ void MembraneCoupling::check_start() {
     const Triple extent = cells[c].extent_um();
     const double radius = 0.5 * std::max({extent[0], extent[1], extent[2]}), area = cells[c].rest_area_um2;
     least_mass_per_area_ = std::min(least_mass_per_area_, scene_.cells[c].mass_pg / area);
-    added_mass_per_area_ = std::max(added_mass_per_area_, scene_.fluid->density_pg_per_um3 * confined * 8.0 / 3 *
-                                                              std::pow(radius, 3) / area);
+    added_mass_per_area_ =
+        std::max(added_mass_per_area_, scene_.fluid->density_pg_per_um3 * confined * 8.0 / 3 * std::pow(radius, 3) / area);
   }
   try {
     load();
@@ -87,8 +86,10 @@ void MembraneCoupling::watch_outflow() {
   outflow_limit_ = scene_.time.stop_before_outflow_um;
   if (!(immersed_->outflow_um() < outflow_limit_)) return;
   outflow_limit_ = 0.5 * immersed_->outflow_um();
-  warn("{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left; move the cell (center_um) or "
-       "lengthen the grid", nearest_outflow(), outflow_limit_);
+  warn(
+      "{}, where the end of the grid disturbs the flow: the run ends when {:.2g} um are left; move the cell (center_um) or "
+      "lengthen the grid",
+      nearest_outflow(), outflow_limit_);
 }
 
 /// How far the fluid gets in two steps at the fastest that it has been: a cell that is nearer may leave the grid before it is
@@ -98,9 +99,7 @@ double MembraneCoupling::two_steps_um(double dt) const {
   return 2 * dt * (fluid.reference_speed > quiet_speed_ ? fluid.reference_speed : fluid.speed);
 }
 
-bool MembraneCoupling::at_outflow(double dt) const {
-  return immersed_->outflow_um() < std::max(outflow_limit_, two_steps_um(dt));
-}
+bool MembraneCoupling::at_outflow(double dt) const { return immersed_->outflow_um() < std::max(outflow_limit_, two_steps_um(dt)); }
 
 std::string MembraneCoupling::outflow_limit(double dt) const {
   const double two_steps = two_steps_um(dt);
@@ -139,9 +138,10 @@ void MembraneCoupling::check_beta(double dt) const {
   constexpr double most = 2;
   const double given = scene_.coupling->robin_coefficient, usual = default_beta(dt);
   if (scene_.coupling->scheme != CouplingSettings::Scheme::robin || !(given > most * usual)) return;
-  warn("coupling.robin_coefficient_pg_per_um2_per_us = {:.3g} is {:.3g} times its default here, {:.3g}: the membrane follows the flow "
-       "that much more slowly; leave it out, or use {:.3g} at most",
-       given, given / usual, usual, most * usual);
+  warn(
+      "coupling.robin_coefficient_pg_per_um2_per_us = {:.3g} is {:.3g} times its default here, {:.3g}: the membrane follows the flow "
+      "that much more slowly; leave it out, or use {:.3g} at most",
+      given, given / usual, usual, most * usual);
 }
 
 std::map<std::string, double> MembraneCoupling::report(double dt) const {
@@ -178,8 +178,7 @@ void StaggeredCoupling::require_stability(const StabilityEstimate& s) const {
       "2 mu / h = {:.3g}, to the shortest membrane wave the grid resolves, and 3/4 of the fluid carried along over the "
       "step, {:.3g}), so this run would diverge. Use coupling.scheme = \"robin\" with its default coefficient, or a "
       "cell of at least {:.3g} pg (cells.0.mass_pg), or coupling.scheme = \"iterated\"",
-      s.mass_term, s.beta, s.threshold(), s.viscous, s.inertial,
-      (s.threshold() - s.beta) / s.mass_term * scene_.cells[0].mass_pg));
+      s.mass_term, s.beta, s.threshold(), s.viscous, s.inertial, (s.threshold() - s.beta) / s.mass_term * scene_.cells[0].mass_pg));
 }
 
 /// An unstable staggered coupling swings to and fro: the velocity after a step has little to do with that before it, and
@@ -194,11 +193,11 @@ void StaggeredCoupling::watch_growth(double change, double speed_square) {
   }
   if (swings_ == 0) swing_start_ = speed_square;
   if (++swings_ < most || !(speed_square > 4 * swing_start_)) return;
-  throw ComputationError(fmt::format(
-      "coupling: the velocity of the membrane has swung to and fro for {} steps and grown {:.2g}-fold. Likely cause: the "
-      "fluid's reaction exceeds what the coupling anticipates; raise coupling.robin_coefficient_pg_per_um2_per_us (it is "
-      "{:.3g}) or cells.0.mass_pg, or use coupling.scheme = \"iterated\"",
-      swings_, std::sqrt(speed_square / swing_start_), beta_));
+  throw ComputationError(
+      fmt::format("coupling: the velocity of the membrane has swung to and fro for {} steps and grown {:.2g}-fold. Likely cause: the "
+                  "fluid's reaction exceeds what the coupling anticipates; raise coupling.robin_coefficient_pg_per_um2_per_us (it is "
+                  "{:.3g}) or cells.0.mass_pg, or use coupling.scheme = \"iterated\"",
+                  swings_, std::sqrt(speed_square / swing_start_), beta_));
 }
 
 StepStatistics StaggeredCoupling::advance(double time, double dt) {
@@ -218,16 +217,14 @@ StepStatistics StaggeredCoupling::advance(double time, double dt) {
   return statistics;
 }
 
-IteratedCoupling::IteratedCoupling(const Case& scene, FluidSolver& fluid, Timers& timers)
-    : MembraneCoupling(scene, fluid, timers) {
+IteratedCoupling::IteratedCoupling(const Case& scene, FluidSolver& fluid, Timers& timers) : MembraneCoupling(scene, fluid, timers) {
   const int vertices = membranes_->vertices();
   x_predicted_ = vertex_vectors("x_predicted", vertices);
   v_answer_ = vertex_vectors("v_answer", vertices);
   constexpr int remembered = 10;
   using Acceleration = CouplingSettings::Acceleration;
   const bool robin_term = uses_robin(*scene.coupling) && scene.coupling->robin_coefficient != 0;
-  if (scene.coupling->acceleration.value_or(robin_term ? Acceleration::anderson : Acceleration::aitken) ==
-      Acceleration::anderson)
+  if (scene.coupling->acceleration.value_or(robin_term ? Acceleration::anderson : Acceleration::aitken) == Acceleration::anderson)
     anderson_ = std::make_unique<AndersonAcceleration>(3 * vertices, remembered);
 }
 
@@ -269,19 +266,18 @@ StepStatistics IteratedCoupling::advance(double time, double dt) {
       anderson_->advance(flat(v_interface_), flat(residual_));
       continue;
     }
-    if (k > 0 && norms.change > 0)
-      relaxation_ = std::clamp(-relaxation_ * norms.product / norms.change, 0.005, 1.5);
+    if (k > 0 && norms.change > 0) relaxation_ = std::clamp(-relaxation_ * norms.product / norms.change, 0.005, 1.5);
     relax_interface(n, relaxation_, residual_, v_interface_, previous_residual_);
   }
-  throw ComputationError(fmt::format(
-      "coupling: the interface velocity still changes by {:.3g} of itself after {} iterations (wanted {:.3g}) at {:.6g} "
-      "us. Likely cause: a light membrane without the Robin term, or a step too long; use coupling.scheme = \"robin\" or "
-      "coupling.robin_in_iterated = true, reduce time.step_us, or raise coupling.max_iterations",
-      residual, coupling.max_iterations, coupling.tolerance, time + dt));
+  throw ComputationError(
+      fmt::format("coupling: the interface velocity still changes by {:.3g} of itself after {} iterations (wanted {:.3g}) at {:.6g} "
+                  "us. Likely cause: a light membrane without the Robin term, or a step too long; use coupling.scheme = \"robin\" or "
+                  "coupling.robin_in_iterated = true, reduce time.step_us, or raise coupling.max_iterations",
+                  residual, coupling.max_iterations, coupling.tolerance, time + dt));
 }
 
-std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid,
-                                        Timers& timers, const PackedCells* packed) {
+std::unique_ptr<Coupling> make_coupling(const Case& scene, const StepSchedule& schedule, FluidSolver& fluid, Timers& timers,
+                                        const PackedCells* packed) {
   std::unique_ptr<Coupling> coupling;
   if (!scene.has_cells())
     coupling = std::make_unique<SharpCoupling>(scene, fluid, timers, nullptr);

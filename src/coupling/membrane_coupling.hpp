@@ -34,7 +34,7 @@ class MembraneCoupling : public SharpCoupling {
   void watch_outflow();
   double two_steps_um(double dt_us) const;
 
-  double outflow_limit_ = 0;  // um
+  double outflow_limit_ = 0;                                                             // um
   double least_mass_per_area_ = 1e300, added_mass_per_area_ = 0, smallest_spacing_ = 0;  // pg/um2, pg/um2, um
 };
 
@@ -46,9 +46,7 @@ class StaggeredCoupling : public MembraneCoupling {
   void check_start() override;
   StepStatistics advance(double time_us, double dt_us) override;
   std::vector<double> state() const override { return {static_cast<double>(swings_), swing_start_}; }
-  void set_state(const std::vector<double>& state) override {
-    swings_ = static_cast<int>(state.at(0)), swing_start_ = state.at(1);
-  }
+  void set_state(const std::vector<double>& state) override { swings_ = static_cast<int>(state.at(0)), swing_start_ = state.at(1); }
 
  private:
   void require_stability(const StabilityEstimate& estimate) const;

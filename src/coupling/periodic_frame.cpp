@@ -23,8 +23,7 @@ PeriodicFrame periodic_frame(const Grid& grid) {
   for (int d = 0; d < 3; ++d)
     for (int e = 0; e < 3; ++e)
       gram[d][e] = frame.periodic[d] && frame.periodic[e] ? dot(frame.period[d], frame.period[e]) : (d == e ? 1.0 : 0.0);
-  const DualBasis inverse({gram[0][0], gram[0][1], gram[0][2]}, {gram[1][0], gram[1][1], gram[1][2]},
-                          {gram[2][0], gram[2][1], gram[2][2]});
+  const DualBasis inverse({gram[0][0], gram[0][1], gram[0][2]}, {gram[1][0], gram[1][1], gram[1][2]}, {gram[2][0], gram[2][1], gram[2][2]});
   for (int d = 0; d < 3; ++d)
     for (int e = 0; e < 3; ++e) frame.dual[d] += inverse.b[d][e] * frame.period[e];
   for (int d = 0; d < 3; ++d)

@@ -61,13 +61,13 @@ std::vector<CaseChange> allowed_changes(const std::string& path, const Checkpoin
     if (!change.geometry)
       allowed.push_back(change);
     else
-      refused += fmt::format("{}{} = {} (in the checkpoint: {})", refused.empty() ? "" : "; ", change.key, change.now,
-                             change.before);
+      refused += fmt::format("{}{} = {} (in the checkpoint: {})", refused.empty() ? "" : "; ", change.key, change.now, change.before);
   }
   if (!refused.empty())
-    throw InputError(fmt::format("{}: this checkpoint is of another scene: {}. A restart may change properties and speeds, not "
-                                 "the geometry: restore these keys, or run the case from its start",
-                                 path, refused));
+    throw InputError(
+        fmt::format("{}: this checkpoint is of another scene: {}. A restart may change properties and speeds, not "
+                    "the geometry: restore these keys, or run the case from its start",
+                    path, refused));
   return allowed;
 }
 
@@ -78,7 +78,7 @@ const char* old_flux_name(int d) { return std::array<const char*, 3>{"flux_old_i
 
 namespace {
 
-const char* const packed_name = "packed_cells";  // [cell, centre, axis, spin]
+const char* const packed_name = "packed_cells";      // [cell, centre, axis, spin]
 const char* const populations_name = "populations";  // [population] cells
 const char* const size_name = "packed_size";
 constexpr hsize_t packed_columns = 7;
@@ -145,8 +145,7 @@ void write_checkpoint(const std::string& path, FlowSimulation& simulation, const
     const CellBox faces = face_range(index, d);
     file.add(flux_name(d), face_shape(index, d), face_slab(index, d), box_values(index, faces, state.flux[d]).data());
     if (state.flux_old[d].data())
-      file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d),
-               box_values(index, faces, state.flux_old[d]).data());
+      file.add(old_flux_name(d), face_shape(index, d), face_slab(index, d), box_values(index, faces, state.flux_old[d]).data());
   }
   const double numbers[2] = {state.reference_speed, progress.last_step};
   file.add("numbers", {2}, numbers);
@@ -243,8 +242,7 @@ void read_coupling(const CheckpointReader& file, FlowSimulation& simulation, boo
 
 }  // namespace
 
-Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
-                         const std::string& files) {
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved, const std::string& files) {
   const IndexSpace& index = simulation.grid().index();
   const CheckpointReader file(path, simulation.grid().comm());
   Restored restored;

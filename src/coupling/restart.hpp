@@ -35,8 +35,7 @@ struct Restored {
 /// Go on from a checkpoint, on any number of ranks.
 /// @param resolved, files  of the present case
 /// @throws InputError  for a file that is damaged, foreign, or of another grid, other sides, or other cells or bodies
-Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved,
-                         const std::string& files);
+Restored read_checkpoint(const std::string& path, FlowSimulation& simulation, const std::string& resolved, const std::string& files);
 
 }  // namespace corpuscle
 

@@ -19,8 +19,7 @@ int suitable_vertices(const Triple& semi_axes, double spacing) {
   const double p = 1.6075;  // Thomsen's approximation of an ellipsoid's area
   const double a = std::pow(semi_axes[0], p), b = std::pow(semi_axes[1], p), c = std::pow(semi_axes[2], p);
   const double area = 4 * std::acos(-1.0) * std::pow((a * b + a * c + b * c) / 3, 1 / p);
-  return std::clamp(static_cast<int>(area / (0.5 * std::sqrt(3.0) * spacing * spacing)), fewest_vertices,
-                    most_vertices);
+  return std::clamp(static_cast<int>(area / (0.5 * std::sqrt(3.0) * spacing * spacing)), fewest_vertices, most_vertices);
 }
 
 /// Rotation by |omega| t about omega (Rodrigues).
@@ -72,8 +71,7 @@ void RigidBodies::move_to(double t) {
     const auto& s = settings_[b];
     for (int m = 0; m < 3; ++m) centre_[b][m] = s.center_um[m] + t * s.velocity_um_per_us[m];
     const auto vec = [](const Triple& a) { return Vec3{a[0], a[1], a[2]}; };
-    RigidMotion motion{vec(s.center_um), vec(centre_[b]), vec(s.velocity_um_per_us),
-                       vec(s.angular_velocity_rad_per_us), {}};
+    RigidMotion motion{vec(s.center_um), vec(centre_[b]), vec(s.velocity_um_per_us), vec(s.angular_velocity_rad_per_us), {}};
     rotation_matrix(s.angular_velocity_rad_per_us, t, motion.rotation);
     move_rigid_body(surfaces_, first_vertex_[b], first_vertex_[b + 1], reference_, motion);
   }

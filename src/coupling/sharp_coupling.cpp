@@ -15,8 +15,7 @@ std::vector<TriangleMesh> body_meshes(const Case& scene, const Grid& grid) {
 
 SharpCoupling::SharpCoupling(const Case& scene, FluidSolver& fluid, Timers& timers, std::unique_ptr<Membranes> membranes)
     : scene_(scene), fluid_(fluid), timers_(timers), membranes_(std::move(membranes)) {
-  surfaces_ = std::make_unique<SurfaceSet>(membranes_ ? membranes_->surfaces()
-                                                      : make_surface_set(body_meshes(scene, fluid.grid())));
+  surfaces_ = std::make_unique<SurfaceSet>(membranes_ ? membranes_->surfaces() : make_surface_set(body_meshes(scene, fluid.grid())));
   if (!scene.bodies.empty()) {
     rigid_bodies_ = std::make_unique<RigidBodies>(scene.bodies, *surfaces_, static_cast<int>(scene.cells.size()));
     rigid_bodies_->move_to(0);

@@ -17,27 +17,27 @@ constexpr double most_ticks = 1e15;  // times are whole numbers of ticks, which 
 /// Whether steps can be counted, before they are.
 void check_counts(const TimeSettings& settings) {
   if (settings.first_step_us > 0 && settings.step_us > settings.first_step_us * std::ldexp(1 + 1e-9, most_doublings))
-    throw InputError(fmt::format("time.first_step_us = {} is too short for steps of {} us (time.step_us): the least is a {}th "
-                                 "of them, {:.3g} us", settings.first_step_us, settings.step_us, 1 << most_doublings,
-                                 std::ldexp(settings.step_us, -most_doublings)));
+    throw InputError(
+        fmt::format("time.first_step_us = {} is too short for steps of {} us (time.step_us): the least is a {}th "
+                    "of them, {:.3g} us",
+                    settings.first_step_us, settings.step_us, 1 << most_doublings, std::ldexp(settings.step_us, -most_doublings)));
   const double shortest = settings.first_step_us > 0 ? std::min(settings.step_us, settings.first_step_us) : settings.step_us;
   if (!(settings.end_us / shortest <= most_ticks))
-    throw InputError(fmt::format("time.end_us = {} is {:.3g} steps of {} us, and at most {:g} can be told apart: raise time.{}, "
-                                 "or lower time.end_us", settings.end_us, settings.end_us / shortest, shortest, most_ticks,
-                                 shortest < settings.step_us ? "first_step_us" : "step_us"));
+    throw InputError(fmt::format(
+        "time.end_us = {} is {:.3g} steps of {} us, and at most {:g} can be told apart: raise time.{}, "
+        "or lower time.end_us",
+        settings.end_us, settings.end_us / shortest, shortest, most_ticks, shortest < settings.step_us ? "first_step_us" : "step_us"));
 }
 
 }  // namespace
 
-StepSchedule::StepSchedule(const TimeSettings& settings, const std::vector<double>& changes_us)
-    : shortest_(settings.step_us), changes_{0} {
+StepSchedule::StepSchedule(const TimeSettings& settings, const std::vector<double>& changes_us) : shortest_(settings.step_us), changes_{0} {
   check_counts(settings);
-  while (settings.first_step_us > 0 && shortest_ > settings.first_step_us * (1 + 1e-9))
-    shortest_ *= 0.5, ++doublings_;
+  while (settings.first_step_us > 0 && shortest_ > settings.first_step_us * (1 + 1e-9)) shortest_ *= 0.5, ++doublings_;
   const long steps = std::llround(settings.end_us / settings.step_us);
   if (std::abs(static_cast<double>(steps) * settings.step_us - settings.end_us) > 1e-9 * settings.end_us)
-    throw InputError(fmt::format("time.end_us = {} is not a whole number of steps of {} us (time.step_us); use {}",
-                                 settings.end_us, settings.step_us, static_cast<double>(steps) * settings.step_us));
+    throw InputError(fmt::format("time.end_us = {} is not a whole number of steps of {} us (time.step_us); use {}", settings.end_us,
+                                 settings.step_us, static_cast<double>(steps) * settings.step_us));
   end_ = steps << doublings_;
   if (doublings_ == 0) return;
   for (double change : changes_us) {

@@ -22,8 +22,13 @@ namespace {
 /// All surfaces on the host.
 struct HostSurfaces {
   explicit HostSurfaces(const SurfaceSet& s)
-      : set(s), x(copy(s.x)), normal(copy(s.normal)), area(copy(s.area)), triangle(triangles_on_host(s)),
-        first_vertex(copy(s.first_vertex)), first_triangle(copy(s.first_triangle)) {
+      : set(s),
+        x(copy(s.x)),
+        normal(copy(s.normal)),
+        area(copy(s.area)),
+        triangle(triangles_on_host(s)),
+        first_vertex(copy(s.first_vertex)),
+        first_triangle(copy(s.first_triangle)) {
     for (int b = 0; b < s.bodies; ++b) {
       Triple low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
       for (int i = first_vertex(b); i < first_vertex(b + 1); ++i)
@@ -129,7 +134,8 @@ std::string check_resolution(const std::string& name, const GridSettings& grid, 
       "{}: the grid is too coarse for it: nodes are {:.3g} um apart across it where it is {:.3g} um thick; spacing over thickness is "
       "{:.{}g} there, and {:.{}g} or more over half of its surface, where no more than {:g} will do for a first look and half of that "
       "for figures: use {} or finer",
-      name, r.spacing_um, r.thickness_um, r.largest, digits, r.typical, digits, limits.coarse, finer_nodes(grid, r, r.typical / limits.coarse));
+      name, r.spacing_um, r.thickness_um, r.largest, digits, r.typical, digits, limits.coarse,
+      finer_nodes(grid, r, r.typical / limits.coarse));
   if (r.typical > limits.hopeless) throw InputError(text);
   return text;
 }
@@ -191,9 +197,10 @@ void check_size(const SpacingMap& map, const Case& scene, const HostSurfaces& s,
       throw InputError(fmt::format("{}: {:.3g} x {:.3g} x {:.3g} um, larger than the grid, which is {:.3g} x {:.3g} x {:.3g} um{}", name,
                                    extent[0], extent[1], extent[2], room[0], room[1], room[2], remedy()));
   if (!(largest >= spacing))
-    throw InputError(fmt::format("{}: {:.3g} x {:.3g} x {:.3g} um, smaller than the spacing of the grid's nodes there, {:.3g} um: refine "
-                                 "the grid (grid.nodes){}",
-                                 name, extent[0], extent[1], extent[2], spacing, remedy()));
+    throw InputError(
+        fmt::format("{}: {:.3g} x {:.3g} x {:.3g} um, smaller than the spacing of the grid's nodes there, {:.3g} um: refine "
+                    "the grid (grid.nodes){}",
+                    name, extent[0], extent[1], extent[2], spacing, remedy()));
 }
 
 /// Winding number of the body's surface about a point: 1 inside, 0 outside.
@@ -233,14 +240,15 @@ void check_outside(const HostSurfaces& s, int inner, int outer, const Triple& sh
   const int first = std::min(inner, outer), second = std::max(inner, outer);
   const std::string there = fmt::format("({:.4g}, {:.4g}, {:.4g}) um", where->x, where->y, where->z);
   if (body_name(s.set, inner) == body_name(s.set, outer))
-    throw InputError(fmt::format("surfaces cross: {} and its image beyond a periodic side overlap near {}; use a longer period or "
-                                 "a smaller body",
-                                 body_name(s.set, inner), there));
+    throw InputError(
+        fmt::format("surfaces cross: {} and its image beyond a periodic side overlap near {}; use a longer period or "
+                    "a smaller body",
+                    body_name(s.set, inner), there));
   if (inside == looked && static_cast<int>(within.size()) == s.first_vertex(inner + 1) - s.first_vertex(inner))
     throw InputError(fmt::format("{} lies inside {}, near {}; nothing else can be where one is: move them apart (center_um)",
                                  body_name(s.set, inner), body_name(s.set, outer), there));
-  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}: move them apart (center_um, axis)",
-                               body_name(s.set, first), body_name(s.set, second), there));
+  throw InputError(fmt::format("surfaces cross: {} and {} overlap near {}: move them apart (center_um, axis)", body_name(s.set, first),
+                               body_name(s.set, second), there));
 }
 
 /// Shifts by whole periods after which two bodies may be near each other.
@@ -278,9 +286,7 @@ void check_apart(const Grid& grid, const HostSurfaces& s, bool shared) {
 
 std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& scene, const SurfaceSet& surfaces,
                                            const std::vector<int>& types) {
-  const auto same = [&](int a, int b) {
-    return types.empty() ? same_type(scene.cells[a], scene.cells[b]) : types[a] == types[b];
-  };
+  const auto same = [&](int a, int b) { return types.empty() ? same_type(scene.cells[a], scene.cells[b]) : types[a] == types[b]; };
   const auto is_copy = [&](int body) { return body >= surfaces.own_cells && body < surfaces.cells; };
   constexpr int looked_at = 250;
   const HostSurfaces s(surfaces);
@@ -312,8 +318,7 @@ std::vector<Resolution> measure_resolution(const SpacingMap& map, const Case& sc
   return results;
 }
 
-std::vector<CoarseSurface> check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces,
-                                          const std::vector<int>& types) {
+std::vector<CoarseSurface> check_surfaces(const Grid& grid, const Case& scene, const SurfaceSet& surfaces, const std::vector<int>& types) {
   const SpacingMap map(grid);
   const HostSurfaces s(surfaces);
   for (int body = 0; body < surfaces.bodies; ++body) check_size(map, scene, s, body);

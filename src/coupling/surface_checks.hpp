@@ -8,10 +8,10 @@ namespace corpuscle {
 
 /// How a grid resolves a body: at each of its vertices, the spacing of nodes across it over how thick it is there.
 struct Resolution {
-  double largest = 0;  // where the body is thinnest, as the grid sees it
-  double typical = 0;  // exceeded over half of the surface
+  double largest = 0;                       // where the body is thinnest, as the grid sees it
+  double typical = 0;                       // exceeded over half of the surface
   double thickness_um = 0, spacing_um = 0;  // where it is largest
-  std::array<double, 3> share{};  // of the grid's index directions in `typical`: the ones to refine
+  std::array<double, 3> share{};            // of the grid's index directions in `typical`: the ones to refine
 };
 
 /// Resolution of each body at its present position, by a few hundred of its vertices.

@@ -15,10 +15,14 @@ using Type = BoundarySettings::Type;
 
 int fill_order(Type type) {
   switch (type) {
-    case Type::outflow: return 0;
-    case Type::symmetry: return 1;
-    case Type::velocity_inlet: return 2;
-    default: return 3;
+    case Type::outflow:
+      return 0;
+    case Type::symmetry:
+      return 1;
+    case Type::velocity_inlet:
+      return 2;
+    default:
+      return 3;
   }
 }
 
@@ -48,8 +52,8 @@ double parabola(double from_middle, bool wall_below, bool wall_above) {
 
 /// Velocity profile over a side, before it is scaled to the wanted mean: 1 on average is not needed here.
 /// @param types  of the six sides
-double shape_factor(const BoundarySettings& s, const GridSettings* grid, const Type (&types)[6], const Triple& x,
-                    const Triple& centre, double radius, int d) {
+double shape_factor(const BoundarySettings& s, const GridSettings* grid, const Type (&types)[6], const Triple& x, const Triple& centre,
+                    double radius, int d) {
   if (s.profile == BoundarySettings::Profile::uniform) return 1;
   if (s.profile == BoundarySettings::Profile::parabolic && is_box(grid)) {
     double factor = 1;
@@ -70,8 +74,7 @@ double shape_factor(const BoundarySettings& s, const GridSettings* grid, const T
 
 }  // namespace
 
-BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySettings>& settings,
-                                       const GridSettings* shape)
+BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySettings>& settings, const GridSettings* shape)
     : grid_(&grid), outflow_("corpuscle::fluid::outflow_mask", grid.index().size()) {
   const IndexSpace& index = grid.index();
   for (std::size_t b = 0; b < settings.size(); ++b) {
@@ -107,9 +110,8 @@ BoundaryConditions::BoundaryConditions(Grid& grid, const std::vector<BoundarySet
     has_inlet_ = has_inlet_ || s.type == Type::velocity_inlet;
     natural_[side.d][side.end] = s.type == Type::outflow || s.type == Type::symmetry;
   }
-  std::stable_sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
-    return fill_order(a.settings.type) < fill_order(b.settings.type);
-  });
+  std::stable_sort(sides_.begin(), sides_.end(),
+                   [](const Side& a, const Side& b) { return fill_order(a.settings.type) < fill_order(b.settings.type); });
   set_prescribed();
   if (prescribed_) {
     profile_ = Components<double>("corpuscle::fluid::boundary_profile", index.size(), 3);
@@ -233,8 +235,10 @@ void BoundaryConditions::set_profile(const Side& side, const GridSettings* shape
     });
     flux = grid_->comm().sum(flux);
     if (!(flux > 0))
-      throw InputError(fmt::format("boundary.{}.radial_table: this inlet profile carries no flow: its speeds must be positive on "
-                                   "average over the side", side.number));
+      throw InputError(
+          fmt::format("boundary.{}.radial_table: this inlet profile carries no flow: its speeds must be positive on "
+                      "average over the side",
+                      side.number));
     scale *= flat / flux;
   }
   auto profile = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), profile_);
@@ -319,9 +323,12 @@ double BoundaryConditions::balance(const Array<double> (&flux)[3], double growth
 
 std::string BoundaryConditions::bounded_by(int side) const {
   switch (types_[side]) {
-    case Type::velocity_inlet: return "an inlet";
-    case Type::symmetry: return "a symmetry side";
-    default: return is_wall_type(types_[side]) ? "a wall" : "";
+    case Type::velocity_inlet:
+      return "an inlet";
+    case Type::symmetry:
+      return "a symmetry side";
+    default:
+      return is_wall_type(types_[side]) ? "a wall" : "";
   }
 }
 

@@ -75,8 +75,7 @@ void InverseCoarsest::update(const MultigridLevel& level) {
 }
 
 AmgCoarsest::AmgCoarsest(MultigridHierarchy& hierarchy)
-    : system_(hierarchy.levels().back().comm, hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false),
-      amg_(system_) {
+    : system_(hierarchy.levels().back().comm, hierarchy.levels().back().views.index, hierarchy.levels().back().halo, false), amg_(system_) {
   const int rows = hierarchy.levels().back().views.index.owned();
   rhs_ = Array<double>("corpuscle::multigrid::coarse_rhs", rows);
   x_ = Array<double>("corpuscle::multigrid::coarse_x", rows);

@@ -12,7 +12,7 @@ FluidEnergy flow_energy(FluidSolver& fluid, double body_volume) {
   const Grid& grid = fluid.grid();
   const GridViews& views = grid.views();
   const auto& g = fluid.coefficients();
-  const auto &u = fluid.velocity();
+  const auto& u = fluid.velocity();
   const bool convective = fluid.settings().convection != FluidSettings::Convection::none;
   const double rho = fluid.settings().density_pg_per_um3, carried = convective ? rho : 0.0, mu = fluid.viscosity();
   const auto own = fluid.skewed() ? fluid_energy<true>(views, g, fluid.kind(), u) : fluid_energy<false>(views, g, fluid.kind(), u);
@@ -27,7 +27,9 @@ FluidEnergy flow_energy(FluidSolver& fluid, double body_volume) {
     for (int end = 0; end < 2; ++end)
       if (fluid.grid().halo().neighbour(d, end) < 0) sides.add(views.index, d, end);
   const auto power = fluid.skewed() ? boundary_power<true> : boundary_power<false>;
-  const Sums<2> through = sides.boxes.count == 0 ? Sums<2>{} : power(views, g, fluid.kind(), fluid.pressure_mask(), carried, mu, u, fluid.pressure(), fluid.flux(), sides);
+  const Sums<2> through = sides.boxes.count == 0
+                              ? Sums<2>{}
+                              : power(views, g, fluid.kind(), fluid.pressure_mask(), carried, mu, u, fluid.pressure(), fluid.flux(), sides);
   std::copy_n(through.value, 2, sums + columns);
   grid.comm().sum(sums, columns + 2);
   // Immersed nodes fill the rest of the fluid's volume, each by the same share on average.

@@ -8,9 +8,9 @@ namespace corpuscle {
 
 /// The flow's energy at one time. Powers are those of the fluid outside bodies.
 struct FluidEnergy {
-  double boundaries_nW = 0;      // in through the sides of the grid: pressure, viscous stress, carried kinetic energy
-  double gradient_nW = 0;        // of the imposed pressure gradient, over the whole volume
-  double dissipation_nW = 0;     // mu times the integral of |grad u|^2
+  double boundaries_nW = 0;   // in through the sides of the grid: pressure, viscous stress, carried kinetic energy
+  double gradient_nW = 0;     // of the imposed pressure gradient, over the whole volume
+  double dissipation_nW = 0;  // mu times the integral of |grad u|^2
   double kinetic_fJ = 0;
   double inflow_um3_per_us = 0;  // through all sides
 };

@@ -65,12 +65,10 @@ FluidSolver::FluidSolver(Grid& grid, const FluidSettings& settings, const std::v
     psi_ = Array<double>("corpuscle::fluid::scalar_vector", owned);
     pressure_system_ = std::make_unique<HypreSystem>(grid.comm(), grid.index(), grid.halo(), true);
     pressure_krylov_ = std::make_unique<PressureKrylov>(
-        *pressure_system_,
-        [cycle = pressure_cycle_.get()](const Array<double>& b, const Array<double>& x) { cycle->apply(b, x); },
+        *pressure_system_, [cycle = pressure_cycle_.get()](const Array<double>& b, const Array<double>& x) { cycle->apply(b, x); },
         settings.max_iterations);
   } else {
-    multigrid_ =
-        std::make_unique<PressureMultigrid>(*hierarchy_, *pressure_cycle_, g_.normal, settings.max_iterations);
+    multigrid_ = std::make_unique<PressureMultigrid>(*hierarchy_, *pressure_cycle_, g_.normal, settings.max_iterations);
   }
   update_pressure_equation();
 }
@@ -103,8 +101,7 @@ void FluidSolver::update_pressure_equation() {
   momentum_->stale = true;
   pressure_cycle_->update(pinned_);
   if (multigrid_) return multigrid_->update(mask_);
-  pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_system_->pattern(), pinned_,
-                      pressure_system_->values());
+  pressure_rows<true>(grid_->views(), g_.normal, kind_, mask_, pressure_system_->pattern(), pinned_, pressure_system_->values());
   pressure_system_->set_values();
 }
 
@@ -257,8 +254,7 @@ double FluidSolver::give_bodies_their_flux(const EmbeddedBodies& bodies) {
 long FluidSolver::cut_off_nodes() {
   const IndexSpace& index = grid_->index();
   Array<int> mark("corpuscle::fluid::mark", index.size()), next("corpuscle::fluid::mark", index.size());
-  for (const auto& seeded : {mark, next})
-    seed_marks(boundaries_.outflow(), boundaries_.has_outflow() ? -1 : pinned_, seeded);
+  for (const auto& seeded : {mark, next}) seed_marks(boundaries_.outflow(), boundaries_.has_outflow() ? -1 : pinned_, seeded);
   for (long added = 1; added > 0;) {
     grid_->halo().exchange(mark);
     added = grid_->comm().sum(static_cast<long>(spread_marks(index, kind_, mark, next)));
@@ -270,11 +266,11 @@ long FluidSolver::cut_off_nodes() {
 void FluidSolver::check_connected() {
   const long cut_off = cut_off_nodes();
   if (cut_off == 0) return;
-  throw ComputationError(fmt::format(
-      "pressure: on this grid the bodies cut off {} fluid nodes from {}. Likely cause: a gap of less than two or three grid "
-      "spacings all around, between a body and a wall, between two bodies or in a body's fold: refine the grid (grid.nodes), "
-      "widen the channel, move the bodies apart (center_um), or end the run before (time.end_us)",
-      cut_off, boundaries_.has_outflow() ? "the outflow" : "the rest"));
+  throw ComputationError(
+      fmt::format("pressure: on this grid the bodies cut off {} fluid nodes from {}. Likely cause: a gap of less than two or three grid "
+                  "spacings all around, between a body and a wall, between two bodies or in a body's fold: refine the grid (grid.nodes), "
+                  "widen the channel, move the bodies apart (center_um), or end the run before (time.end_us)",
+                  cut_off, boundaries_.has_outflow() ? "the outflow" : "the rest"));
 }
 
 /// @param before  the divergence that the last solve started from; its potential has not been applied yet if `attempted`
@@ -292,8 +288,7 @@ void FluidSolver::fail_projection(double before, double target, bool attempted) 
   if (!boundaries_.has_outflow()) failure.net_inflow = grid_->comm().sum(sum_of(negative_divergence_));
   for (const auto& flux : flux_) failure.face_flux = larger(failure.face_flux, grid_->comm().max(largest_magnitude(flux)));
   failure.speed = grid_->comm().max(largest_speed(grid_->index(), kind_, u_));
-  failure.earlier_speed =
-      std::max(boundaries_.largest_speed(), grid_->comm().max(largest_speed(grid_->index(), kind_, u_old_)));
+  failure.earlier_speed = std::max(boundaries_.largest_speed(), grid_->comm().max(largest_speed(grid_->index(), kind_, u_old_)));
   throw ComputationError(explain(failure));
 }
 

@@ -62,9 +62,7 @@ class FluidSolver {
   /// The present step over the one before, 0 for a first step.
   double step_ratio() const { return ratio_; }
   /// Velocity scale of tolerances: never below the largest speed seen.
-  void raise_reference_speed(double speed) {
-    statistics_.reference_speed = larger(statistics_.reference_speed, speed);
-  }
+  void raise_reference_speed(double speed) { statistics_.reference_speed = larger(statistics_.reference_speed, speed); }
   /// Imposed mean pressure gradient, kPa/um.
   const Vec3& imposed_gradient() const { return imposed_gradient_; }
 
@@ -90,7 +88,12 @@ class FluidSolver {
   void visit_varying_viscosity(const Use& use) const {
     const GridViews& grid = grid_->views();
     if (relative_viscosity_.data())
-      use(VaryingViscosity{relative_viscosity_, least_viscosity_, has_bodies_, fluidity_, smooth_viscosity_, grid.x,
+      use(VaryingViscosity{relative_viscosity_,
+                           least_viscosity_,
+                           has_bodies_,
+                           fluidity_,
+                           smooth_viscosity_,
+                           grid.x,
                            {grid.face_area[0], grid.face_area[1], grid.face_area[2]},
                            excess_marks_,
                            {excess_[0], excess_[1], excess_[2]},
@@ -178,18 +181,18 @@ class FluidSolver {
   Array<double> flux_[3], flux_old_[3], flux_extrapolated_[3];
   Array<NodeKind> kind_;
   PressureMask mask_;
-  Array<double> relative_viscosity_;  // empty: one viscosity
-  Array<double> fluidity_;            // empty: no cell holds two fluids
-  Array<double> smooth_viscosity_;    // where some do
+  Array<double> relative_viscosity_;   // empty: one viscosity
+  Array<double> fluidity_;             // empty: no cell holds two fluids
+  Array<double> smooth_viscosity_;     // where some do
   Array<unsigned char> excess_marks_;  // [cell] of a viscosity that varies, and only then, as the next two
-  Components<double> excess_[3];      // [cell, 3] on faces, um2/us times the viscosity
-  Components<double> excess_force_;   // [cell, 3]
+  Components<double> excess_[3];       // [cell, 3] on faces, um2/us times the viscosity
+  Components<double> excess_force_;    // [cell, 3]
   double least_viscosity_ = 1;
   bool has_bodies_ = true;  // until a solve knows
   ViscousCoefficients g_;
-  double residual_norm_ = 0, velocity_norm_ = 0;  // um/us, 2-norms over all nodes, at the last momentum_residual()
+  double residual_norm_ = 0, velocity_norm_ = 0;        // um/us, 2-norms over all nodes, at the last momentum_residual()
   std::unique_ptr<PressureAcceleration> acceleration_;  // once a step has needed it
-  Array<double> negative_divergence_, psi_;    // compact scalars (psi_ on skewed grids only)
+  Array<double> negative_divergence_, psi_;             // compact scalars (psi_ on skewed grids only)
   Table<double> body_sums_;
   HostCopy<Table<double>> body_sums_host_;
   HostCopy<Array<double>> growth_host_;
@@ -209,9 +212,9 @@ class FluidSolver {
     HostCopy<Kokkos::View<Sums<2>, Memory>> two_host{two};
   };
   std::unique_ptr<Momentum> momentum_;
-  std::unique_ptr<PressureCycle> pressure_cycle_;    // preconditioner of both
-  std::unique_ptr<PressureMultigrid> multigrid_;     // orthogonal grids
-  std::unique_ptr<HypreSystem> pressure_system_;     // skewed ones
+  std::unique_ptr<PressureCycle> pressure_cycle_;  // preconditioner of both
+  std::unique_ptr<PressureMultigrid> multigrid_;   // orthogonal grids
+  std::unique_ptr<HypreSystem> pressure_system_;   // skewed ones
   std::unique_ptr<PressureKrylov> pressure_krylov_;
   Components<double> body_force_;
   std::function<void(double)> update_force_;

@@ -11,11 +11,16 @@ namespace {
 
 const char* name_of(HypreErrors::Step step) {
   switch (step) {
-    case HypreErrors::matrix: return "take the matrix of the pressure equation";
-    case HypreErrors::vectors: return "take the right-hand side of the pressure equation";
-    case HypreErrors::amg_set_up: return "set up BoomerAMG for the pressure equation";
-    case HypreErrors::amg_cycle: return "run a cycle of BoomerAMG for the pressure equation";
-    default: return "solve the pressure equation by flexible GMRES";
+    case HypreErrors::matrix:
+      return "take the matrix of the pressure equation";
+    case HypreErrors::vectors:
+      return "take the right-hand side of the pressure equation";
+    case HypreErrors::amg_set_up:
+      return "set up BoomerAMG for the pressure equation";
+    case HypreErrors::amg_cycle:
+      return "run a cycle of BoomerAMG for the pressure equation";
+    default:
+      return "solve the pressure equation by flexible GMRES";
   }
 }
 
@@ -45,8 +50,7 @@ void HypreErrors::raise(const Comm& comm) {
   if (worst == 0) return;
   const int code = worst % codes;
   throw ComputationError(fmt::format(
-      "pressure: hypre could not {}: error {}, {}. Likely cause: {}", name_of(static_cast<Step>(worst / codes)), code,
-      describe(code),
+      "pressure: hypre could not {}: error {}, {}. Likely cause: {}", name_of(static_cast<Step>(worst / codes)), code, describe(code),
       code & HYPRE_ERROR_MEMORY
           ? "not enough memory: take a coarser grid (grid.nodes) or more ranks on more machines"
           : "a row of the equation that is zero or not a number, of a diverging run (reduce time.step_us) or of a degenerate "

@@ -4,8 +4,7 @@
 
 #include <HYPRE.h>
 
-#if (defined(KOKKOS_ENABLE_CUDA) && !defined(HYPRE_USING_CUDA)) || \
-    (defined(KOKKOS_ENABLE_HIP) && !defined(HYPRE_USING_HIP))
+#if (defined(KOKKOS_ENABLE_CUDA) && !defined(HYPRE_USING_CUDA)) || (defined(KOKKOS_ENABLE_HIP) && !defined(HYPRE_USING_HIP))
 #error "Kokkos runs on the GPU but hypre was built for the host: build hypre for the same GPU back end"
 #endif
 #if !defined(CORPUSCLE_MPI) && !defined(HYPRE_SEQUENTIAL)

@@ -128,8 +128,8 @@ double FluidSolver::residual_target(double size) {
   const double tolerance = settings_.momentum_tolerance, scale = std::max(size, residual_norm_);
   if (tolerance <= strict) return tolerance * scale;
   if (size == 0) return std::min(tolerance, share) * scale;
-  const double change = std::sqrt(grid_->comm().sum(
-      inertia_square(grid_->views(), kind_, mass_ / mu_, momentum_->cycle.levels()[0].views.inverse, u_, u_old_)));
+  const double change = std::sqrt(
+      grid_->comm().sum(inertia_square(grid_->views(), kind_, mass_ / mu_, momentum_->cycle.levels()[0].views.inverse, u_, u_old_)));
   return std::max(strict * scale, std::min(tolerance * scale, share * change));
 }
 
@@ -157,15 +157,14 @@ void FluidSolver::solve_momentum(const EmbeddedBodies* bodies, double residual) 
   // Round-off of sums of a few dozen terms; a solve that has come this far has converged as far as it can.
   constexpr double round_off = 1e-14, falling = 0.5;
   const double scale = size > 0 ? size : 1;
-  const char* cause = residual_norm_ <= round_off * scale
-                          ? "the tolerance is finer than double precision; raise fluid.momentum_tolerance"
+  const char* cause = residual_norm_ <= round_off * scale ? "the tolerance is finer than double precision; raise fluid.momentum_tolerance"
                       : iterations >= settings_.max_iterations && residual_norm_ <= falling * start
                           ? "too few iterations: the residual was still falling; raise fluid.max_iterations"
                           : "a step too long for the flow or a diverging run; reduce time.step_us";
-  throw ComputationError(fmt::format(
-      "velocity: the momentum equation did not converge in {} iterations (residual {:.3g} of the velocity, from {:.3g}, wanted "
-      "{:.3g}). Likely cause: {}",
-      iterations, residual_norm_ / scale, start / scale, target / scale, cause));
+  throw ComputationError(
+      fmt::format("velocity: the momentum equation did not converge in {} iterations (residual {:.3g} of the velocity, from {:.3g}, wanted "
+                  "{:.3g}). Likely cause: {}",
+                  iterations, residual_norm_ / scale, start / scale, target / scale, cause));
 }
 
 /// The cycle's equation for the present mass, node kinds and viscosity, where they changed; after the hierarchy's update.

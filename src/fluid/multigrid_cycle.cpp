@@ -55,7 +55,8 @@ void MultigridCycle<Field>::find_small_levels() {
 
 template <class Field>
 void MultigridCycle<Field>::solve_directly(const DirectLevel& coarsest) {
-  if (first_small_ == levels_.size()) throw std::logic_error("multigrid: a level that is solved directly must be small and one rank's alone");
+  if (first_small_ == levels_.size())
+    throw std::logic_error("multigrid: a level that is solved directly must be small and one rank's alone");
   small_.coarsest = coarsest, direct_ = true;
 }
 

@@ -20,7 +20,7 @@ class MultigridHierarchy {
     Components<CycleReal> conductances;  // those of the views, side by side
     Comm comm;                           // this rank alone, where it has the whole level
     Halo halo;
-    double strength = 0;                 // sum of all ranks' conductances, without bodies
+    double strength = 0;                             // sum of all ranks' conductances, without bodies
     std::unique_ptr<Gathering> cells{}, faces[3]{};  // where the level is the first of which each rank has the whole; else null
   };
   static constexpr int most_direct = 500;  // cells of a coarsest level that is solved directly

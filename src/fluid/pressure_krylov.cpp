@@ -43,8 +43,7 @@ PressureKrylov::PressureKrylov(HypreSystem& system, Preconditioner preconditione
   HYPRE_ParCSRFlexGMRESSetMaxIter(gmres_, max_iterations);
   HYPRE_ParCSRFlexGMRESSetTol(gmres_, 0);
   HYPRE_ParCSRFlexGMRESSetPrintLevel(gmres_, 0);
-  HYPRE_ParCSRFlexGMRESSetPrecond(gmres_, call_preconditioner, keep_preconditioner,
-                                  reinterpret_cast<HYPRE_Solver>(&preconditioner_));
+  HYPRE_ParCSRFlexGMRESSetPrecond(gmres_, call_preconditioner, keep_preconditioner, reinterpret_cast<HYPRE_Solver>(&preconditioner_));
   system.errors().check(HypreErrors::krylov);
   system.errors().raise(system.comm());
 }

@@ -7,8 +7,8 @@
 
 namespace corpuscle {
 
-PressureMultigrid::PressureMultigrid(MultigridHierarchy& hierarchy, PressureCycle& cycle,
-                                     const Array<double> (&coefficient)[3], int max_iterations)
+PressureMultigrid::PressureMultigrid(MultigridHierarchy& hierarchy, PressureCycle& cycle, const Array<double> (&coefficient)[3],
+                                     int max_iterations)
     : comm_(hierarchy.comm()), halo_(&hierarchy.levels()[0].halo), cycle_(&cycle), max_iterations_(max_iterations) {
   const IndexSpace& index = hierarchy.levels()[0].views.index;
   operator_.index = index;

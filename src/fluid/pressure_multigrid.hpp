@@ -12,8 +12,7 @@ namespace corpuscle {
 class PressureMultigrid {
  public:
   /// @param coefficient  [cell] of the normal pressure difference, by direction (ViscousCoefficients::normal)
-  PressureMultigrid(MultigridHierarchy& hierarchy, PressureCycle& cycle, const Array<double> (&coefficient)[3],
-                    int max_iterations);
+  PressureMultigrid(MultigridHierarchy& hierarchy, PressureCycle& cycle, const Array<double> (&coefficient)[3], int max_iterations);
 
   /// Take over which nodes have a pressure, after the cycle's own update.
   void update(const PressureMask& mask);
@@ -22,8 +21,8 @@ class PressureMultigrid {
   /// that of `rhs` (compact): then solve again for what is left. The `residual` returned is that of the start.
   KrylovResult solve(const Array<double>& rhs, const Array<double>& x, double absolute_tolerance);
 
-  /// Whether the host waits for every iteration's outcome, as it must where ranks add up. If not, a device goes on until as many are done as
-  /// the last solve took, less one: the answer is the same, since iterations beyond the end change nothing.
+  /// Whether the host waits for every iteration's outcome, as it must where ranks add up. If not, a device goes on until as many are done
+  /// as the last solve took, less one: the answer is the same, since iterations beyond the end change nothing.
   bool look_always = Kokkos::SpaceAccessibility<Kokkos::HostSpace, Memory>::accessible;
 
  private:

@@ -15,8 +15,7 @@ std::string cause(const ProjectionFailure& f) {
   constexpr double runaway = 10;   // in one step; a start from rest is measured against what is prescribed
   constexpr double falling = 0.5;  // in the last solve
   const double round_off = 30 * std::numeric_limits<double>::epsilon() * f.face_flux;  // six faces, each a sum of a few terms
-  if (!std::isfinite(f.divergence) || !std::isfinite(f.speed))
-    return "the fluxes are not a number: a diverging run; reduce time.step_us";
+  if (!std::isfinite(f.divergence) || !std::isfinite(f.speed)) return "the fluxes are not a number: a diverging run; reduce time.step_us";
   if (std::abs(f.net_inflow) > f.target)
     return fmt::format(
         "the fluxes prescribed around the fluid do not conserve volume: {:.3g} um3/us more flow in than out, and there is no "

@@ -17,18 +17,14 @@ Triple operator+(const Triple& a, const Triple& b) { return {a[0] + b[0], a[1] +
 Triple operator-(const Triple& a, const Triple& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Triple operator*(double s, const Triple& a) { return {s * a[0], s * a[1], s * a[2]}; }
 double dot(const Triple& a, const Triple& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Triple cross(const Triple& a, const Triple& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+Triple cross(const Triple& a, const Triple& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 Triple unit(const Triple& a) { return (1 / std::sqrt(dot(a, a))) * a; }
 
 /// Integral of 1 / sqrt(1 + sin^2) from 0 to phi: the arc length of the lemniscate at sin(phi). Ten-point Gauss rule on
 /// eight pieces, exact to rounding for phi up to pi / 2.
 double lemniscate_arc(double phi) {
-  static constexpr double node[5] = {0.1488743389816312, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845,
-                                     0.9739065285171717};
-  static constexpr double weight[5] = {0.2955242247147529, 0.2692667193099963, 0.2190863625159820,
-                                       0.1494513491505806, 0.0666713443086881};
+  static constexpr double node[5] = {0.1488743389816312, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845, 0.9739065285171717};
+  static constexpr double weight[5] = {0.2955242247147529, 0.2692667193099963, 0.2190863625159820, 0.1494513491505806, 0.0666713443086881};
   constexpr int pieces = 8;
   double sum = 0;
   const double half = phi / (2 * pieces);
@@ -136,8 +132,8 @@ class Spline {
   }
   double end() const { return t_.back(); }
   Triple at(double t) const {
-    const int i = std::clamp(static_cast<int>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin()) - 1, 0,
-                             static_cast<int>(t_.size()) - 2);
+    const int i =
+        std::clamp(static_cast<int>(std::upper_bound(t_.begin(), t_.end(), t) - t_.begin()) - 1, 0, static_cast<int>(t_.size()) - 2);
     const double h = t_[i + 1] - t_[i], a = (t_[i + 1] - t) / h, b = (t - t_[i]) / h;
     return a * p_[i] + b * p_[i + 1] + (h * h / 6 * (a * a * a - a)) * m_[i] + (h * h / 6 * (b * b * b - b)) * m_[i + 1];
   }
@@ -159,7 +155,8 @@ std::function<Triple(double)> centerline_curve(const GridSettings& s, double& en
       end = 2 * std::acos(-1.0) * s.helix_turns;
       return [r, rise](double t) { return Triple{r * std::cos(t), r * std::sin(t), rise * t}; };
     }
-    case GridSettings::Centerline::spline: break;
+    case GridSettings::Centerline::spline:
+      break;
   }
   const Spline spline(s.points_um);
   end = spline.end();
@@ -169,8 +166,7 @@ std::function<Triple(double)> centerline_curve(const GridSettings& s, double& en
 }  // namespace
 
 std::array<double, 2> square_to_disk(double u, double v, GridSettings::CrossSection map) {
-  if (map == GridSettings::CrossSection::elliptical)
-    return {u * std::sqrt(1 - 0.5 * v * v), v * std::sqrt(1 - 0.5 * u * u)};
+  if (map == GridSettings::CrossSection::elliptical) return {u * std::sqrt(1 - 0.5 * v * v), v * std::sqrt(1 - 0.5 * u * u)};
   return conformal_disk(u, v);
 }
 
@@ -235,10 +231,14 @@ Centerline::Frame Centerline::at(double s) const {
 
 NodeSource make_node_source(const GridSettings& settings) {
   switch (settings.generator) {
-    case GridSettings::Generator::box: return box(settings);
-    case GridSettings::Generator::straight_tube: return straight_tube(settings);
-    case GridSettings::Generator::swept_tube: return swept_tube(settings);
-    case GridSettings::Generator::file: break;
+    case GridSettings::Generator::box:
+      return box(settings);
+    case GridSettings::Generator::straight_tube:
+      return straight_tube(settings);
+    case GridSettings::Generator::swept_tube:
+      return swept_tube(settings);
+    case GridSettings::Generator::file:
+      break;
   }
   return read_node_file(settings.file);
 }

@@ -86,18 +86,17 @@ void check_translates(const NodeSource& source, int d, const Triple& period) {
       const Triple a = source.node(near[0], near[1], near[2]), b = source.node(far[0], far[1], far[2]);
       for (int m = 0; m < 3; ++m)
         if (!(std::abs(b[m] - a[m] - period[m]) <= tolerance))
-          throw InputError(fmt::format(
-              "boundary: the {} sides cannot be periodic: they are not the same shape moved along one vector (node "
-              "({}, {}, {}) is out of place by {:.3g} um)",
-              std::array<const char*, 3>{"i", "j", "k"}[d], far[0], far[1], far[2], b[m] - a[m] - period[m]));
+          throw InputError(
+              fmt::format("boundary: the {} sides cannot be periodic: they are not the same shape moved along one vector (node "
+                          "({}, {}, {}) is out of place by {:.3g} um)",
+                          std::array<const char*, 3>{"i", "j", "k"}[d], far[0], far[1], far[2], b[m] - a[m] - period[m]));
     }
 }
 
 }  // namespace
 
 Grid::Grid(const Comm& comm, const NodeSource& source, const std::array<bool, 3>& periodic)
-    : comm_(comm), views_{decompose(comm, source.cells, periodic, &ranks_), {}, {}, {}, {}},
-      halo_(comm, views_.index, ranks_) {
+    : comm_(comm), views_{decompose(comm, source.cells, periodic, &ranks_), {}, {}, {}, {}}, halo_(comm, views_.index, ranks_) {
   const int size = views_.index.size();
   views_.x = Components<double>("corpuscle::grid::x", size, 3);
   for (int d = 0; d < 3; ++d) views_.face_area[d] = Components<double>("corpuscle::grid::face_area", size, 3);
@@ -157,8 +156,7 @@ void Grid::check_volumes() {
   double found[7] = {0, 0, 0, 0, 0, 0, 0};  // cell, centre and volume, from the first rank that has one
   if (first == comm_.rank()) {
     const IndexSpace& index = views_.index;
-    const int at[3] = {smallest.loc % index.n[0], (smallest.loc / index.n[0]) % index.n[1],
-                       smallest.loc / (index.n[0] * index.n[1])};
+    const int at[3] = {smallest.loc % index.n[0], (smallest.loc / index.n[0]) % index.n[1], smallest.loc / (index.n[0] * index.n[1])};
     const auto x = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.x);
     const auto volume = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), views_.volume);
     const int c = index.cell(at[0], at[1], at[2]);
@@ -166,11 +164,11 @@ void Grid::check_volumes() {
     found[6] = volume(c);
   }
   comm_.sum(found, 7);
-  throw InputError(fmt::format(
-      "grid: cell ({}, {}, {}) at ({:.4g}, {:.4g}, {:.4g}) um has the volume {:.3g} um3; every cell needs a positive "
-      "one. The grid is folded or left-handed there: check the node coordinates and their order (i, j, k must form a "
-      "right-handed system)",
-      found[0], found[1], found[2], found[3], found[4], found[5], found[6]));
+  throw InputError(
+      fmt::format("grid: cell ({}, {}, {}) at ({:.4g}, {:.4g}, {:.4g}) um has the volume {:.3g} um3; every cell needs a positive "
+                  "one. The grid is folded or left-handed there: check the node coordinates and their order (i, j, k must form a "
+                  "right-handed system)",
+                  found[0], found[1], found[2], found[3], found[4], found[5], found[6]));
 }
 
 void Grid::measure() {

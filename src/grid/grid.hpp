@@ -1,8 +1,8 @@
 // One rank's block of the curvilinear grid: geometry, halo exchange, and facts about the whole grid.
 #pragma once
 
-#include "grid/geometry.hpp"
 #include "grid/generators.hpp"
+#include "grid/geometry.hpp"
 #include "parallel/halo.hpp"
 
 #include <vector>

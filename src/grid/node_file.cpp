@@ -42,14 +42,13 @@ NodeSet::NodeSet(const std::string& path)
   if (set.id < 0) throw InputError(fmt::format("grid.file = \"{}\": has no data set \"nodes\"", path));
   const Handle space{H5Dget_space(set.id), H5Sclose};
   hsize_t n[4] = {0, 0, 0, 0};
-  if (H5Sget_simple_extent_ndims(space.id) != 4 || H5Sget_simple_extent_dims(space.id, n, nullptr) != 4 || n[3] != 3 ||
-      n[0] < 4 || n[1] < 4 || n[2] < 4)
-    throw InputError(fmt::format(
-        "grid.file = \"{}\": data set \"nodes\" must have the shape [nk, nj, ni, 3] with at least 4 nodes a direction",
-        path));
+  if (H5Sget_simple_extent_ndims(space.id) != 4 || H5Sget_simple_extent_dims(space.id, n, nullptr) != 4 || n[3] != 3 || n[0] < 4 ||
+      n[1] < 4 || n[2] < 4)
+    throw InputError(
+        fmt::format("grid.file = \"{}\": data set \"nodes\" must have the shape [nk, nj, ni, 3] with at least 4 nodes a direction", path));
   if (std::max({n[0], n[1], n[2]}) > most_nodes)
-    throw InputError(fmt::format("grid.file = \"{}\": {} x {} x {} nodes; at most {} a direction are allowed", path, n[2],
-                                 n[1], n[0], most_nodes));
+    throw InputError(
+        fmt::format("grid.file = \"{}\": {} x {} x {} nodes; at most {} a direction are allowed", path, n[2], n[1], n[0], most_nodes));
   ni = static_cast<int>(n[2]), nj = static_cast<int>(n[1]), nk = static_cast<int>(n[0]);
 }
 

@@ -32,7 +32,7 @@ class SpacingMap {
   NodeSteps near(const Triple& lower, const Triple& upper) const;
 
  private:
-  static constexpr int bins = 16;  // a direction of the box around the grid
+  static constexpr int bins = 16;     // a direction of the box around the grid
   static constexpr int columns = 19;  // of a bin: how many cells, and their sums of the three tensors
   int bin(double x, int d) const;
 

@@ -115,8 +115,7 @@ void check_tube(const Centerline& line, double diameter_um) {
     throw InputError(fmt::format(
         "grid: the tube of {:.3g} um diameter runs through itself: its centreline comes back to {}, {:.3g} um from where it was at "
         "{}. Lead the centreline further apart (grid.points_um, grid.helix_pitch_um) or use a smaller grid.diameter_um",
-        diameter_um, text(sections.frame(other).position), norm(vec(sections.frame(other).position) - vec(f.position)),
-        text(f.position)));
+        diameter_um, text(sections.frame(other).position), norm(vec(sections.frame(other).position) - vec(f.position)), text(f.position)));
   }
 }
 

@@ -90,10 +90,9 @@ ImmersedBoundary::ImmersedBoundary(const GridViews& grid, const SurfaceSet& surf
              make<Array<int>>("vertex_image", surface.vertices),
              make<Array<int>>("node_boxes", 6 * (surface.bodies + 1)),
              make<Array<Key>>("vertex_findings", 4)};
-  normals_ = {make<Components<double>>("face_normal", surface.triangles, 3),
-              make<Components<double>>("angle_normal", surface.vertices, 3)};
-  band_ = {make<Array<Key>>("closest", cells), make<Array<int>>("cut_links", cells),
-           make<Array<double>>("distance", cells), make<Components<double>>("foot", cells, 3)};
+  normals_ = {make<Components<double>>("face_normal", surface.triangles, 3), make<Components<double>>("angle_normal", surface.vertices, 3)};
+  band_ = {make<Array<Key>>("closest", cells), make<Array<int>>("cut_links", cells), make<Array<double>>("distance", cells),
+           make<Components<double>>("foot", cells, 3)};
   nodes_ = {make<Array<NodeKind>>("kind", cells), make<Array<int>>("body", cells)};
   previous_kind_ = make<Array<NodeKind>>("previous_kind", cells);
   reached_ = make<Array<std::int8_t>>("reached", cells);
@@ -205,8 +204,7 @@ void ImmersedBoundary::mark_nodes(const NodeBox& box) {
 }
 
 void ImmersedBoundary::wrap(int first, int last, bool from_start) {
-  if (periodic() && last > first)
-    wrap_bodies(surface_, first, last, options_.frame, from_start, images_.count, places_.status, laps_);
+  if (periodic() && last > first) wrap_bodies(surface_, first, last, options_.frame, from_start, images_.count, places_.status, laps_);
 }
 
 std::vector<double> ImmersedBoundary::laps_state() const {
@@ -335,17 +333,13 @@ void ImmersedBoundary::build_stencils() {
   update_surface_velocity();
 }
 
-void ImmersedBoundary::update_surface_velocity() {
-  interpolate_surface_velocity(surface_, feet_, counts_.immersed, u_surface_);
-}
+void ImmersedBoundary::update_surface_velocity() { interpolate_surface_velocity(surface_, feet_, counts_.immersed, u_surface_); }
 
 void ImmersedBoundary::reconstruct_velocity(const Components<double>& u) const {
   apply_velocity_rows(velocity_, counts_.immersed, u_surface_, u);
 }
 
-void ImmersedBoundary::extend_pressure(const Array<double>& p) const {
-  apply_pressure_rows(pressure_, counts_.immersed, p);
-}
+void ImmersedBoundary::extend_pressure(const Array<double>& p) const { apply_pressure_rows(pressure_, counts_.immersed, p); }
 
 const SurfaceStress& ImmersedBoundary::find_stress(const TractionInput& fields) {
   tractions(input(), places_, fields, stress_, traction_counts_);
@@ -357,9 +351,7 @@ std::vector<int> ImmersedBoundary::traction_fallbacks() const {
   return {counts.data(), counts.data() + counts.extent(0)};
 }
 
-Slip ImmersedBoundary::slip(const Components<double>& u) const {
-  return surface_slip(input(), places_, u);
-}
+Slip ImmersedBoundary::slip(const Components<double>& u) const { return surface_slip(input(), places_, u); }
 
 std::vector<char> ImmersedBoundary::owned_vertices() const {
   const auto image = to_host(places_.image);
@@ -371,8 +363,7 @@ std::vector<char> ImmersedBoundary::owned_vertices() const {
 std::string ImmersedBoundary::describe_vertex(int vertex) const {
   const Vec3 x = load(to_host(surface_.x), vertex);
   const int body = to_host(surface_.vertex_body)(vertex), first = to_host(surface_.first_vertex)(body);
-  return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y,
-                     x.z);
+  return fmt::format("{}, vertex {} at ({:.4g}, {:.4g}, {:.4g}) um", body_name(surface_, body), vertex - first, x.x, x.y, x.z);
 }
 
 int ImmersedBoundary::nearest_guarded_side(int vertex) const {

@@ -17,15 +17,15 @@ namespace corpuscle {
 
 struct ImmersedOptions {
   std::array<bool, 6> guarded{};  // i_min, i_max, j_min, ...: sides that no surface may come near
-  PeriodicFrame frame;         // of the periodic directions
+  PeriodicFrame frame;            // of the periodic directions
   /// Where nodes of others lie beside this block's (other ranks', or its own at the other end of a periodic direction): the
   /// sum over all ranks, and the exchange of halos.
   std::function<long(long)> sum;
   std::function<void(const Array<std::int8_t>&)> exchange;
   std::function<void(const BandViews&)> exchange_band;  // keys and cut links
-  std::array<bool, 6> outflow{}; // sides through which the first `travellers` vertices, those of cells, may leave
+  std::array<bool, 6> outflow{};                        // sides through which the first `travellers` vertices, those of cells, may leave
   int travellers = 0;
-  Array<unsigned char> pressure_given;   // [cell] boundary nodes where the pressure is known, those of outflow sides; empty for none
+  Array<unsigned char> pressure_given;  // [cell] boundary nodes where the pressure is known, those of outflow sides; empty for none
 };
 
 /// Results of the last classify() and build_stencils() on this rank's owned nodes; the caller adds up over ranks.
@@ -38,22 +38,22 @@ struct ImmersedCounts {
   int owned_vertices = 0;
   std::vector<int> body_immersed, body_inside;
   std::array<int, row_kinds> velocity_rows{}, pressure_rows{};  // by RowKind
-  int lost_vertex = -1;         // lowest vertex beyond a physical boundary seen here; -1: none
-  double wall_spacings = 1e30;  // least distance to a guarded side, in local spacings
-  int wall_vertex = -1;         // the vertex that has it
-  double outflow_um = 1e30;     // least distance of a cell to an outflow, along the grid line
-  int outflow_vertex = -1;      // the vertex that has it
-  int crossed_links = 0;        // where surfaces cross, each other or themselves
-  int crossed_node = -1;        // a node there
+  int lost_vertex = -1;                                         // lowest vertex beyond a physical boundary seen here; -1: none
+  double wall_spacings = 1e30;                                  // least distance to a guarded side, in local spacings
+  int wall_vertex = -1;                                         // the vertex that has it
+  double outflow_um = 1e30;                                     // least distance of a cell to an outflow, along the grid line
+  int outflow_vertex = -1;                                      // the vertex that has it
+  int crossed_links = 0;                                        // where surfaces cross, each other or themselves
+  int crossed_node = -1;                                        // a node there
   double body_spacings = 1e30;  // least gap between two bodies, in spacings; what exceeds one may have escaped
   int gap_node = -1;            // a node there
 };
 
 /// A node and the bodies that its and its neighbours' closest surface points belong to.
 struct NearBodies {
-  Vec3 at;                // um
-  int body, other = -1;   // -1: no other
-  int around = -1;        // that a neighbour lies in with no triangle between; -1: none does
+  Vec3 at;               // um
+  int body, other = -1;  // -1: no other
+  int around = -1;       // that a neighbour lies in with no triangle between; -1: none does
 };
 
 /// Owns the search band, the classification and the stencils of one rank's block. Communicates only through its options.

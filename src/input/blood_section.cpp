@@ -16,7 +16,8 @@ BloodSettings read_blood(Section& s) {
     b.bins = s.integer({"bins", "How many layers profiles have."}, least_bins, most_bins);
   else
     s.describe({"bins", "How many layers profiles have."}, "a whole number from 2 to 32", "about a grid spacing each");
-  b.layer_window_um = s.number({"layer_window_um", "Length of the windows along the wall in which the outermost membrane is looked for."}, between(least_um, most_um), b.layer_window_um);
+  b.layer_window_um = s.number({"layer_window_um", "Length of the windows along the wall in which the outermost membrane is looked for."},
+                               between(least_um, most_um), b.layer_window_um);
   s.finish();
   return b;
 }

@@ -50,11 +50,11 @@ bool only_of_the_run(const std::string& key) {
 bool is_geometry(const std::string& key) {
   if (starts_with(key, "number of") || starts_with(key, "grid.")) return true;
   if (starts_with(key, "populations.")) return true;  // packed anew they would be other cells
-  if (starts_with(key, "bodies.")) return true;  // moved as prescribed from the start: another velocity is another place
+  if (starts_with(key, "bodies.")) return true;       // moved as prescribed from the start: another velocity is another place
   if (starts_with(key, "boundary.")) return ends_with(key, ".side") || ends_with(key, ".type");
   if (!starts_with(key, "cells.") && !starts_with(key, "cell_types.")) return false;
-  for (const char* name : {".type", ".vertices", ".shape", ".diameter_um", ".radius_um", ".semi_axes_um", ".mesh", ".interior",
-                           ".scale", ".recenter", ".align", ".center_um", ".axis", ".spin_deg", ".start_stretch"})
+  for (const char* name : {".type", ".vertices", ".shape", ".diameter_um", ".radius_um", ".semi_axes_um", ".mesh", ".interior", ".scale",
+                           ".recenter", ".align", ".center_um", ".axis", ".spin_deg", ".start_stretch"})
     if (ends_with(key, name)) return true;
   return false;
 }

@@ -19,14 +19,12 @@ void check_sides_given_once(const Case& scene, const std::array<int, 6>& entry_o
     const auto side = scene.boundaries[b].side;
     const int first = entry_of[static_cast<int>(side)];
     if (first != static_cast<int>(b))
-      complain(entry(b), "side",
-               fmt::format("this side already has a [[boundary]] (boundary.{}); give each side one", first));
+      complain(entry(b), "side", fmt::format("this side already has a [[boundary]] (boundary.{}); give each side one", first));
   }
   std::string missing;
   for (int s = 0; s < 6; ++s)
     if (entry_of[s] < 0) missing += (missing.empty() ? "" : ", ") + std::string(name_of(static_cast<Side>(s)));
-  if (!missing.empty())
-    complain("boundary", "", fmt::format("no [[boundary]] for {}; each of the six sides needs one", missing));
+  if (!missing.empty()) complain("boundary", "", fmt::format("no [[boundary]] for {}; each of the six sides needs one", missing));
 }
 
 void check_tube_sides(const Case& scene, const Complaint& complain) {
@@ -55,12 +53,12 @@ void check_sharp_scheme(const Case& scene, const Complaint& complain) {
 void check_force_scheme(const Case& scene, const Complaint& complain) {
   if (scene.bodies.empty()) return;
   if (!scene.contact)
-    complain("bodies", "",
-             "cells that are forces (coupling.scheme = \"force\") feel rigid bodies through contact, which also tells of one that gets into "
-             "a body: add [contact]");
+    complain(
+        "bodies", "",
+        "cells that are forces (coupling.scheme = \"force\") feel rigid bodies through contact, which also tells of one that gets into "
+        "a body: add [contact]");
   if (!scene.populations.empty())
-    complain("populations", "",
-             "cells are not packed around rigid bodies: leave these out, or place the cells one by one in [[cells]]");
+    complain("populations", "", "cells are not packed around rigid bodies: leave these out, or place the cells one by one in [[cells]]");
   if (scene.blood)
     complain("blood", "",
              "blood is measured in channels without obstacles, where its volume, profiles and plasma's flow are known: leave this section "
@@ -75,8 +73,9 @@ void check_populations(const Case& scene, const Complaint& complain) {
       complain(fmt::format("cell_types.{}", cell.type), "recenter",
                fmt::format("populations.{} places its cells by the centroid of their volume: set it to true, or leave it out", p));
     if (scene.coupling->scheme != CouplingSettings::Scheme::force)
-      complain(fmt::format("populations.{}", p), "",
-               "cells are packed only as membranes that are forces: set coupling.scheme = \"force\", or place them one by one in [[cells]]");
+      complain(
+          fmt::format("populations.{}", p), "",
+          "cells are packed only as membranes that are forces: set coupling.scheme = \"force\", or place them one by one in [[cells]]");
   }
 }
 
@@ -85,7 +84,8 @@ void check_dissipation(const Case& scene, const Complaint& complain) {
   if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force) return;
   const auto check = [&](const std::string& section, const CellSettings& cell) {
     if (cell.dissipation == CellSettings::Dissipation::full)
-      complain(section, "dissipation", "\"full\" resists turning as well as straining, and a free cell would not turn with the fluid that its "
+      complain(section, "dissipation",
+               "\"full\" resists turning as well as straining, and a free cell would not turn with the fluid that its "
                "membrane is part of in coupling.scheme = \"force\": use \"central\", or leave it out");
   };
   for (std::size_t c = 0; c < scene.cells.size(); ++c) check(constants_entry(scene, c), scene.cells[c]);
@@ -104,7 +104,8 @@ void check_pushes(const Case& scene, const std::array<int, 6>& entry_of, const C
   if (first < 0) return;
   const std::string cell = fmt::format("cells.{}", first);
   if (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force)
-    complain(cell, "push_nN", "only membranes that are forces (coupling.scheme = \"force\") can be pushed: leave it out, or use that scheme");
+    complain(cell, "push_nN",
+             "only membranes that are forces (coupling.scheme = \"force\") can be pushed: leave it out, or use that scheme");
   if (!scene.bodies.empty()) return;  // which are held
   for (int side : entry_of) {
     const auto type = scene.boundaries[side].type;
@@ -147,8 +148,7 @@ const char* name_of(BoundarySettings::Side side) {
 void check_boundaries(const Case& scene, const Complaint& complain) {
   std::array<int, 6> entry_of;
   entry_of.fill(-1);
-  for (std::size_t b = scene.boundaries.size(); b-- > 0;)
-    entry_of[static_cast<int>(scene.boundaries[b].side)] = static_cast<int>(b);
+  for (std::size_t b = scene.boundaries.size(); b-- > 0;) entry_of[static_cast<int>(scene.boundaries[b].side)] = static_cast<int>(b);
   check_sides_given_once(scene, entry_of, complain);
 
   int inlets = 0, outflows = 0, inlet = 0;
@@ -157,14 +157,12 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
     const auto opposite = static_cast<Side>(static_cast<int>(boundary.side) ^ 1);
     const auto& partner = scene.boundaries[entry_of[static_cast<int>(opposite)]];
     if (boundary.type == Type::periodic && partner.type != Type::periodic)
-      complain(entry(b), "type",
-               fmt::format("periodic sides come in pairs: make {} periodic as well", name_of(opposite)));
+      complain(entry(b), "type", fmt::format("periodic sides come in pairs: make {} periodic as well", name_of(opposite)));
     if (boundary.type == Type::velocity_inlet) ++inlets, inlet = static_cast<int>(b);
     if (boundary.type == Type::outflow) ++outflows;
   }
   check_tube_sides(scene, complain);
-  if (inlets == 1 && outflows == 0)
-    complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
+  if (inlets == 1 && outflows == 0) complain(entry(inlet), "type", "fluid flows in but has no way out: make one side \"outflow\"");
 
   check_gradient(scene, entry_of, complain);
   check_pushes(scene, entry_of, complain);
@@ -173,19 +171,17 @@ void check_boundaries(const Case& scene, const Complaint& complain) {
 
 void check_modules(const Case& scene, const Complaint& complain) {
   if (scene.stretching) {
-    for (const auto& [present, name] :
-         std::initializer_list<std::pair<bool, const char*>>{{scene.fluid.has_value(), "fluid"},
-                                                             {scene.grid.has_value(), "grid"},
-                                                             {!scene.boundaries.empty(), "boundary"},
-                                                             {!scene.bodies.empty(), "bodies"},
-                                                             {scene.coupling.has_value(), "coupling"},
-                                                             {scene.contact.has_value(), "contact"},
-                                                             {scene.blood.has_value(), "blood"},
-                                                             {!scene.populations.empty(), "populations"}})
+    for (const auto& [present, name] : std::initializer_list<std::pair<bool, const char*>>{{scene.fluid.has_value(), "fluid"},
+                                                                                           {scene.grid.has_value(), "grid"},
+                                                                                           {!scene.boundaries.empty(), "boundary"},
+                                                                                           {!scene.bodies.empty(), "bodies"},
+                                                                                           {scene.coupling.has_value(), "coupling"},
+                                                                                           {scene.contact.has_value(), "contact"},
+                                                                                           {scene.blood.has_value(), "blood"},
+                                                                                           {!scene.populations.empty(), "populations"}})
       if (present) complain(name, "", "a stretching test has no fluid: leave out this section or [stretching]");
     if (scene.cells.size() != 1)
-      complain("stretching", "",
-               fmt::format("a stretching test pulls one cell; the case has {} [[cells]]", scene.cells.size()));
+      complain("stretching", "", fmt::format("a stretching test pulls one cell; the case has {} [[cells]]", scene.cells.size()));
     for (std::size_t c = 0; c < scene.cells.size(); ++c)
       if (scene.cells[c].push_nN != Triple{})
         complain(fmt::format("cells.{}", c), "push_nN", "a stretching test pulls with stretching.force_pN: leave this out");
@@ -194,7 +190,11 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (!scene.fluid && !scene.bodies.empty()) complain("bodies", "", "rigid bodies need a [fluid]");
   if (!scene.fluid && !scene.boundaries.empty()) complain("boundary", "", "boundaries need a [fluid]");
   if (!scene.fluid && scene.grid) complain("grid", "", "a grid without a [fluid] has no use");
-  if (!scene.fluid) complain(!scene.cells.empty() ? "cells" : scene.populations.empty() ? "" : "populations", "", "nothing to compute: add [fluid] or [stretching]");
+  if (!scene.fluid)
+    complain(!scene.cells.empty()        ? "cells"
+             : scene.populations.empty() ? ""
+                                         : "populations",
+             "", "nothing to compute: add [fluid] or [stretching]");
   if (!scene.grid) complain("fluid", "", "a fluid needs a [grid]");
   if (scene.coupling && !scene.has_cells())
     complain("coupling", "", "there are no [[cells]] to couple to the fluid: leave this section out");
@@ -205,12 +205,13 @@ void check_modules(const Case& scene, const Complaint& complain) {
   if (scene.contact && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
     complain("contact", "",
              !scene.has_cells() ? "there are no [[cells]] to touch each other: leave this section out"
-                                 : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
+                                : "only membranes that are forces may touch: set coupling.scheme = \"force\", or leave this section out");
   if (scene.blood && (!scene.coupling || scene.coupling->scheme != CouplingSettings::Scheme::force))
     complain("blood", "",
-             !scene.has_cells() ? "there are no [[cells]] to measure: leave this section out"
-                                 : "blood is measured where the fluid is everywhere, in cells too: set coupling.scheme = \"force\", or leave "
-                                   "this section out");
+             !scene.has_cells()
+                 ? "there are no [[cells]] to measure: leave this section out"
+                 : "blood is measured where the fluid is everywhere, in cells too: set coupling.scheme = \"force\", or leave "
+                   "this section out");
   check_populations(scene, complain);
   check_boundaries(scene, complain);
 }
@@ -227,10 +228,12 @@ void check_sampling(const Case& scene, const Complaint& complain) {
              fmt::format("sampling would begin at {:g} us, and the run ends at {:g} us (time.end_us): begin earlier, or run longer",
                          scene.blood->from_us, scene.time.end_us));
   else if (scene.blood && scene.blood->sample_every_us > 0 && !is_sampled(scene))
-    complain("blood", "sample_every_us",
-             fmt::format("no sample, of those at whole multiples of it, falls between blood.from_us = {:g} us and time.end_us = {:g} us: sample more "
-                         "often, or run longer",
-                         scene.blood->from_us, scene.time.end_us));
+    complain(
+        "blood", "sample_every_us",
+        fmt::format(
+            "no sample, of those at whole multiples of it, falls between blood.from_us = {:g} us and time.end_us = {:g} us: sample more "
+            "often, or run longer",
+            scene.blood->from_us, scene.time.end_us));
 }
 
 bool is_sampled(const Case& scene) {

@@ -75,8 +75,7 @@ class CaseReader {
       root_ = toml::parse(file.text, file.path);
     } catch (const toml::parse_error& error) {
       const auto& at = error.source().begin;
-      throw InputError(
-          fmt::format("{}:{}: not valid TOML at column {}: {}", file.path, at.line, at.column, error.description()));
+      throw InputError(fmt::format("{}:{}: not valid TOML at column {}: {}", file.path, at.line, at.column, error.description()));
     }
   }
 
@@ -88,27 +87,24 @@ class CaseReader {
       if (name == "title") continue;
       const bool table = node.is_table() || node.is_array_of_tables();
       const auto at = fmt::format("{}:{}: {}", source_.file, node.source().begin.line, name);
-      const auto known = std::find_if(std::begin(section_names), std::end(section_names),
-                                      [&](const SectionName& s) { return s.name == name; });
+      const auto known =
+          std::find_if(std::begin(section_names), std::end(section_names), [&](const SectionName& s) { return s.name == name; });
       if (known == std::end(section_names)) {
         const auto like = nearest(name, names);
-        throw InputError(fmt::format(
-            "{}{}: unknown {}; {}", at, table ? "" : " = " + toml_text(node),
-            table ? "section" : "key outside any section",
-            like.empty() ? fmt::format("known: {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
+        throw InputError(
+            fmt::format("{}{}: unknown {}; {}", at, table ? "" : " = " + toml_text(node), table ? "section" : "key outside any section",
+                        like.empty() ? fmt::format("known: {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
       }
-      if (known->listed && !node.is_array_of_tables())
-        throw InputError(fmt::format("{}: write it as a list entry, [[{}]]", at, name));
-      if (!known->listed && !node.is_table())
-        throw InputError(fmt::format("{}: write it as one section, [{}]", at, name));
+      if (known->listed && !node.is_array_of_tables()) throw InputError(fmt::format("{}: write it as a list entry, [[{}]]", at, name));
+      if (!known->listed && !node.is_table()) throw InputError(fmt::format("{}: write it as one section, [{}]", at, name));
     }
   }
 
   void read_title(Case& scene) {
     if (const auto* title = root_.get("title")) {
       if (!title->is_string())
-        throw InputError(fmt::format("{}:{}: title = {}: must be a text in quotes", source_.file,
-                                     title->source().begin.line, toml_text(*title)));
+        throw InputError(
+            fmt::format("{}:{}: title = {}: must be a text in quotes", source_.file, title->source().begin.line, toml_text(*title)));
       scene.title = *title->value<std::string>();
     }
     echo_ += "title = " + toml_text(scene.title) + "\n";
@@ -120,8 +116,7 @@ class CaseReader {
         complain("time", "", "a stretching test goes from rest to rest and has no [time]: leave this section out");
       return;
     }
-    if (!root_.contains("time"))
-      throw InputError(source_.file + ": section [time] is missing; it needs step_us and end_us");
+    if (!root_.contains("time")) throw InputError(source_.file + ": section [time] is missing; it needs step_us and end_us");
     scene.time = one<TimeSettings>("time", [&](Section& s) { return read_time(s, follows_late(scene)); });
     note_time_without_effect(scene);
   }
@@ -163,24 +158,29 @@ class CaseReader {
   static void note_sharp_aggregation(Case& scene) {
     if (!scene.coupling || scene.coupling->pressure != CouplingSettings::Pressure::sharp) return;
     if (!scene.contact || !(scene.contact->aggregation_energy > 0)) return;
-    scene.remarks.push_back("coupling.pressure = \"sharp\" with contact.aggregation_energy_fJ_per_um2: a sharp pressure takes normal loads as means over "
-                            "neighbouring vertices, and aggregation acts on few; of its work a fifth (two cells) to four fifths (a pack that starts pressed) is not "
-                            "accounted for, whatever the step: use coupling.pressure = \"spread\"");
+    scene.remarks.push_back(
+        "coupling.pressure = \"sharp\" with contact.aggregation_energy_fJ_per_um2: a sharp pressure takes normal loads as means over "
+        "neighbouring vertices, and aggregation acts on few; of its work a fifth (two cells) to four fifths (a pack that starts pressed) "
+        "is not "
+        "accounted for, whatever the step: use coupling.pressure = \"spread\"");
   }
 
   static void note_often_history(Case& scene) {
     const double every = scene.output.history_every_us;
     const double shortest = scene.time.first_step_us > 0 ? std::min(scene.time.first_step_us, scene.time.step_us) : scene.time.step_us;
     if (scene.stretching || every == 0 || every >= 0.5 * shortest) return;
-    scene.remarks.push_back(fmt::format("output.history_every_us = {:g} is less than the shortest step, {:g} us: each step is a line, "
-                                        "as with 0", every, shortest));
+    scene.remarks.push_back(
+        fmt::format("output.history_every_us = {:g} is less than the shortest step, {:g} us: each step is a line, "
+                    "as with 0",
+                    every, shortest));
   }
 
   static void note_no_samples(Case& scene) {
     if (!scene.blood || is_sampled(scene)) return;
-    scene.remarks.push_back(fmt::format("blood.sample_every_us: unless it is set, samples are ten steps apart, {:g} us, and none of them falls between "
-                                        "blood.from_us = {:g} us and time.end_us = {:g} us: nothing of blood will be told",
-                                        scene.blood->interval_us(scene.time.step_us), scene.blood->from_us, scene.time.end_us));
+    scene.remarks.push_back(
+        fmt::format("blood.sample_every_us: unless it is set, samples are ten steps apart, {:g} us, and none of them falls between "
+                    "blood.from_us = {:g} us and time.end_us = {:g} us: nothing of blood will be told",
+                    scene.blood->interval_us(scene.time.step_us), scene.blood->from_us, scene.time.end_us));
   }
 
   /// Types that no cell is of.
@@ -193,7 +193,8 @@ class CaseReader {
         unused.push_back(fmt::format("cell_types.{} (\"{}\")", t, scene.cell_types[t].name));
     }
     if (!unused.empty())
-      scene.remarks.push_back(fmt::format("no cell is of {}: {} no effect", fmt::join(unused, ", "), unused.size() == 1 ? "it has" : "they have"));
+      scene.remarks.push_back(
+          fmt::format("no cell is of {}: {} no effect", fmt::join(unused, ", "), unused.size() == 1 ? "it has" : "they have"));
   }
 
   /// Keys of cells that membranes as forces have no use for: refused, they would have to be taken out of a case to try it with
@@ -229,7 +230,8 @@ class CaseReader {
     const std::string number = scene.populations.empty() ? std::to_string(scene.cells.size()) : "many";
     scene.remarks.push_back(
         fmt::format("there are {} cells and no [contact]: nothing but the fluid keeps them apart, and that they cross would not be "
-                    "seen; add [contact]", number));
+                    "seen; add [contact]",
+                    number));
   }
 
   template <class Settings, class Read>
@@ -257,8 +259,7 @@ class CaseReader {
   [[noreturn]] void complain(const std::string& path, const std::string& key, const std::string& problem) const {
     const auto dot = path.find('.');
     const auto* node = root_.get(path.substr(0, dot));
-    if (node && node->is_array())
-      node = node->as_array()->get(dot == std::string::npos ? 0 : std::stoul(path.substr(dot + 1)));
+    if (node && node->is_array()) node = node->as_array()->get(dot == std::string::npos ? 0 : std::stoul(path.substr(dot + 1)));
     Section(source_, path, node ? node->as_table() : nullptr).fail(key, problem);
   }
 
@@ -274,8 +275,7 @@ CaseFile load_case_file(const std::string& path) {
   if (std::filesystem::is_directory(path, ignored)) throw InputError(path + ": is a folder, not a case file");
   std::ifstream in(path, std::ios::binary);
   CaseFile file{path, {std::istreambuf_iterator<char>(in), {}}};
-  if (!in.is_open() || in.bad())
-    throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
+  if (!in.is_open() || in.bad()) throw InputError(path + ": cannot read the case file (it does not exist, or reading it is not permitted)");
   return file;
 }
 
@@ -292,8 +292,6 @@ std::string resolved_text(const Case& scene) {
   return text;
 }
 
-Case read_case(const std::string& path, const std::vector<std::string>& overrides) {
-  return read_case(load_case_file(path), overrides);
-}
+Case read_case(const std::string& path, const std::vector<std::string>& overrides) { return read_case(load_case_file(path), overrides); }
 
 }  // namespace corpuscle

@@ -38,13 +38,13 @@ void read_semi_axes(Section& s, CellSettings& c) {
   const auto [low, high] = std::minmax_element(c.semi_axes_um.begin(), c.semi_axes_um.end());
   if (*high < least_extent_um / 2)
     s.fail("semi_axes_um", fmt::format("the largest must be at least {}: are these um?", least_extent_um / 2));
-  if (*high > 10 * *low)
-    s.fail("semi_axes_um", "the largest may be ten times the smallest; give other shapes as a mesh file");
+  if (*high > 10 * *low) s.fail("semi_axes_um", "the largest may be ten times the smallest; give other shapes as a mesh file");
 }
 
 void read_built_in_shape(Section& s, CellSettings& c) {
   for (const char* key : {"scale", "recenter", "align"}) s.unused(key, "only a cell with a mesh file has this key");
-  c.shape = s.choice<Shape>({"shape", "Built-in shape at rest."}, {{"biconcave", Shape::biconcave}, {"sphere", Shape::sphere}, {"ellipsoid", Shape::ellipsoid}}, c.shape);
+  c.shape = s.choice<Shape>({"shape", "Built-in shape at rest."},
+                            {{"biconcave", Shape::biconcave}, {"sphere", Shape::sphere}, {"ellipsoid", Shape::ellipsoid}}, c.shape);
   const auto has = [&](Shape shape, const char* name, const char* key) {
     if (c.shape != shape) s.unused(key, fmt::format("only shape = \"{}\" has this key", name));
     return c.shape == shape;
@@ -54,7 +54,8 @@ void read_built_in_shape(Section& s, CellSettings& c) {
   if (has(Shape::sphere, "sphere", "radius_um"))
     c.radius_um = s.number({"radius_um", "Radius of the sphere."}, between(least_extent_um / 2, most_extent_um / 2));
   if (has(Shape::ellipsoid, "ellipsoid", "semi_axes_um")) read_semi_axes(s, c);
-  c.vertices = s.integer({"vertices", "How many particles the membrane has; any number, not only those of regular refinements."}, c.shape == Shape::biconcave ? 200 : 42, 30000, c.vertices);
+  c.vertices = s.integer({"vertices", "How many particles the membrane has; any number, not only those of regular refinements."},
+                         c.shape == Shape::biconcave ? 200 : 42, 30000, c.vertices);
 }
 
 void read_mesh_shape(Section& s, CellSettings& c) {
@@ -63,13 +64,16 @@ void read_mesh_shape(Section& s, CellSettings& c) {
     s.unused(key, "the mesh file decides the shape (scale = ... its size): leave out this key or mesh");
   c.vertices = 0;
   c.scale = s.number({"scale", "Factor from the file's unit of length to um."}, positive(most_scale), c.scale);
-  c.recenter = s.flag({"recenter", "Whether center_um is where the centroid of the file's volume goes, or where the file's origin goes."}, c.recenter);
+  c.recenter = s.flag({"recenter", "Whether center_um is where the centroid of the file's volume goes, or where the file's origin goes."},
+                      c.recenter);
   c.align = s.flag({"align", "Whether a mesh that is a disc has its own axis turned to `axis`, or the file's z."}, c.align);
 }
 
 void read_rest(Section& s, CellSettings& c) {
   const bool built_in = c.mesh.empty();
-  c.reference = s.choice<Reference>({"reference", "At which lengths and angles the membrane rests: those of its shape; the same lengths with the angles of a sphere; equal lengths and angles; those of an oblate spheroid of its area."},
+  c.reference = s.choice<Reference>({"reference",
+                                     "At which lengths and angles the membrane rests: those of its shape; the same lengths with the angles "
+                                     "of a sphere; equal lengths and angles; those of an oblate spheroid of its area."},
                                     {{"shape", Reference::shape},
                                      {"spontaneous-angle", Reference::spontaneous_angle},
                                      {"uniform", Reference::uniform},
@@ -78,7 +82,9 @@ void read_rest(Section& s, CellSettings& c) {
   if (c.reference == Reference::spheroid) {
     if (!built_in || c.shape != Shape::biconcave)
       s.fail("reference", "only the built-in biconcave shape rests on a spheroid: leave out reference, or mesh and shape");
-    c.reference_reduced_volume = s.number({"reference_reduced_volume", "Volume of the stress-free spheroid over that of a sphere of its area."}, between(0.65, 1), c.reference_reduced_volume);
+    c.reference_reduced_volume =
+        s.number({"reference_reduced_volume", "Volume of the stress-free spheroid over that of a sphere of its area."}, between(0.65, 1),
+                 c.reference_reduced_volume);
   } else {
     s.unused("reference_reduced_volume", "only reference = \"spheroid\" has this key");
   }
@@ -89,10 +95,11 @@ void read_rest(Section& s, CellSettings& c) {
 }
 
 void read_law(Section& s, CellSettings& c) {
-  c.law =
-      s.choice<Law>({"law", "Elastic law in the plane: springs (worm-like chains against a power), or a neo-Hookean or Skalak sheet."}, {{"wlc-pow", Law::wlc_pow}, {"neo-hookean", Law::neo_hookean}, {"skalak", Law::skalak}}, c.law);
+  c.law = s.choice<Law>({"law", "Elastic law in the plane: springs (worm-like chains against a power), or a neo-Hookean or Skalak sheet."},
+                        {{"wlc-pow", Law::wlc_pow}, {"neo-hookean", Law::neo_hookean}, {"skalak", Law::skalak}}, c.law);
   if (c.law == Law::skalak)
-    c.skalak_c = s.number({"skalak_c", "C of the Skalak law: the modulus of area is the shear modulus times 1 + 2 C."}, not_negative(1e6), c.skalak_c);
+    c.skalak_c = s.number({"skalak_c", "C of the Skalak law: the modulus of area is the shear modulus times 1 + 2 C."}, not_negative(1e6),
+                          c.skalak_c);
   else
     s.unused("skalak_c", "only law = \"skalak\" has this key");
   // Springs know nothing of areas; sheets do, and have further terms only where they are asked for.
@@ -102,20 +109,27 @@ void read_law(Section& s, CellSettings& c) {
 void read_membrane(Section& s, CellSettings& c) {
   using Dissipation = CellSettings::Dissipation;
   read_law(s, c);
-  c.shear_modulus_uN_per_m = s.number({"shear_modulus_uN_per_m", "Shear modulus of the membrane at small strains."}, positive(most_uN_per_m), c.shear_modulus_uN_per_m);
+  c.shear_modulus_uN_per_m = s.number({"shear_modulus_uN_per_m", "Shear modulus of the membrane at small strains."},
+                                      positive(most_uN_per_m), c.shear_modulus_uN_per_m);
   // The default passes through the same conversion as a value from a file, so that the echo reads back to the same
   // bits.
   c.bending_modulus_fJ = s.number({"bending_modulus_J", "Bending modulus of the membrane."}, not_negative(most_J), 2.4e-19) * units::J;
-  c.area_modulus_uN_per_m = s.number({"area_modulus_uN_per_m", "Stiffness against change of the whole surface."}, not_negative(most_uN_per_m), c.area_modulus_uN_per_m);
-  c.local_area_modulus_uN_per_m = s.number({"local_area_modulus_uN_per_m", "Stiffness against change of each triangle's area."}, not_negative(most_uN_per_m), c.local_area_modulus_uN_per_m);
+  c.area_modulus_uN_per_m = s.number({"area_modulus_uN_per_m", "Stiffness against change of the whole surface."},
+                                     not_negative(most_uN_per_m), c.area_modulus_uN_per_m);
+  c.local_area_modulus_uN_per_m = s.number({"local_area_modulus_uN_per_m", "Stiffness against change of each triangle's area."},
+                                           not_negative(most_uN_per_m), c.local_area_modulus_uN_per_m);
   if (c.law == Law::wlc_pow && c.local_area_modulus_uN_per_m == 0)
     s.fail("local_area_modulus_uN_per_m",
            "must be above 0: with springs and the total area alone triangles can collapse or fold at no cost, the problem "
            "is ill-posed and solutions get stuck");
-  c.volume_modulus_Pa = s.number({"volume_modulus_Pa", "Stiffness against change of the enclosed volume where no fluid is inside."}, not_negative(most_Pa), c.volume_modulus_Pa);
-  c.membrane_viscosity_N_s_per_m = s.number({"membrane_viscosity_N_s_per_m", "Surface viscosity of the membrane."}, not_negative(most_N_s_per_m), c.membrane_viscosity_N_s_per_m);
-  c.dissipation =
-      s.choice<Dissipation>({"dissipation", "What of the relative velocity of two linked vertices dissipates: that along their link (\"central\"), or all of it (\"full\")."}, {{"central", Dissipation::central}, {"full", Dissipation::full}}, c.dissipation);
+  c.volume_modulus_Pa = s.number({"volume_modulus_Pa", "Stiffness against change of the enclosed volume where no fluid is inside."},
+                                 not_negative(most_Pa), c.volume_modulus_Pa);
+  c.membrane_viscosity_N_s_per_m = s.number({"membrane_viscosity_N_s_per_m", "Surface viscosity of the membrane."},
+                                            not_negative(most_N_s_per_m), c.membrane_viscosity_N_s_per_m);
+  c.dissipation = s.choice<Dissipation>(
+      {"dissipation",
+       "What of the relative velocity of two linked vertices dissipates: that along their link (\"central\"), or all of it (\"full\")."},
+      {{"central", Dissipation::central}, {"full", Dissipation::full}}, c.dissipation);
 }
 
 Bounds viscosity_ratios() {
@@ -135,21 +149,28 @@ void read_constants(Section& s, CellSettings& c) {
     read_mesh_shape(s, c);
   c.mass_pg = s.number({"mass_pg", "Mass of the membrane of a cell that cuts the grid."}, positive(most_pg), c.mass_pg);
   read_rest(s, c);
-  c.interior = s.choice<Interior>({"interior", "What is inside: with \"empty\" a hole in the fluid where membranes cut the grid."}, {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
+  c.interior = s.choice<Interior>({"interior", "What is inside: with \"empty\" a hole in the fluid where membranes cut the grid."},
+                                  {{"empty", Interior::empty}, {"cytosol", Interior::cytosol}}, c.interior);
   if (c.interior == Interior::cytosol)
-    s.fail("interior", "leave this key out, or use \"empty\": with coupling.scheme = \"force\" the cell is filled with fluid (viscosity_ratio), and with the "
-                       "others it has none and its volume is held exactly");
-  c.viscosity_ratio = s.number({"viscosity_ratio", "Viscosity of the fluid inside over that of the fluid outside."}, viscosity_ratios(), c.viscosity_ratio);
+    s.fail("interior",
+           "leave this key out, or use \"empty\": with coupling.scheme = \"force\" the cell is filled with fluid (viscosity_ratio), and "
+           "with the "
+           "others it has none and its volume is held exactly");
+  c.viscosity_ratio =
+      s.number({"viscosity_ratio", "Viscosity of the fluid inside over that of the fluid outside."}, viscosity_ratios(), c.viscosity_ratio);
   read_membrane(s, c);
 }
 
 void read_place(Section& s, CellSettings& c, bool placed) {
   const Bounds anywhere = between(-most_um, most_um);
-  c.center_um = placed ? s.triple({"center_um", "Where the cell's centre starts."}, anywhere) : s.triple({"center_um", "Where the cell's centre starts."}, anywhere, Triple{});
+  c.center_um = placed ? s.triple({"center_um", "Where the cell's centre starts."}, anywhere)
+                       : s.triple({"center_um", "Where the cell's centre starts."}, anywhere, Triple{});
   c.axis = read_axis(s);
   c.spin_deg = s.number({"spin_deg", "Rotation about that axis."}, between(-360, 360), c.spin_deg);
-  c.start_stretch = s.triple({"start_stretch", "Factors by which the cell starts drawn out along its own axes, its volume kept."}, between(0.5, 2), c.start_stretch);
-  c.push_nN = s.triple({"push_nN", "Constant force on the cell from outside, the same share on each vertex."}, between(-most_nN, most_nN), Triple{});
+  c.start_stretch = s.triple({"start_stretch", "Factors by which the cell starts drawn out along its own axes, its volume kept."},
+                             between(0.5, 2), c.start_stretch);
+  c.push_nN = s.triple({"push_nN", "Constant force on the cell from outside, the same share on each vertex."}, between(-most_nN, most_nN),
+                       Triple{});
 }
 
 std::vector<std::string> known_constants(const Section& s) {
@@ -162,16 +183,14 @@ std::vector<std::string> known_constants(const Section& s) {
 /// The constants of the type that the cell names.
 CellSettings of_type(Section& s, const std::vector<CellTypeSettings>& types) {
   if (types.empty())
-    s.fail("type",
-           "the case has no [[cell_types]]: add one with this name, or leave out type and give the cell's keys here");
+    s.fail("type", "the case has no [[cell_types]]: add one with this name, or leave out type and give the cell's keys here");
   const auto& [name, cell] = types[read_type(s, types)];
   const auto constants = known_constants(s);
   for (const auto& key : s.present())
     if (std::find(constants.begin(), constants.end(), key) != constants.end())
-      s.fail(key,
-             fmt::format("this belongs to the cell's type, \"{}\": set {} (for all its cells), give this cell a type of its "
-                         "own, or leave out type and give all its keys here",
-                         name, constant_key(cell, key)));
+      s.fail(key, fmt::format("this belongs to the cell's type, \"{}\": set {} (for all its cells), give this cell a type of its "
+                              "own, or leave out type and give all its keys here",
+                              name, constant_key(cell, key)));
   return cell;
 }
 

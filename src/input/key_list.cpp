@@ -77,7 +77,8 @@ Read reader_of(const std::string& name) {
   if (name == "cell_types") return [](Section& s) { read_cell_type(s, {}); };
   if (name == "cells")
     return [](Section& s) {
-      s.describe({"type", "The type of the cell, in place of keys of its own."}, "the name of one of [[cell_types]], which then has the keys that all its cells share", "");
+      s.describe({"type", "The type of the cell, in place of keys of its own."},
+                 "the name of one of [[cell_types]], which then has the keys that all its cells share", "");
       read_cell(s, {}, true);
     };
   if (name == "populations") return [](Section& s) { read_population(s, {}); };
@@ -100,8 +101,23 @@ std::vector<SectionRecord> list_keys() {
 }
 
 std::string unit_of(const std::string& key) {
-  static const std::vector<std::string> units{"pg_per_um2_per_us", "um2_per_us", "pg_per_um3", "Pa_per_um", "fJ_per_um2", "N_s_per_m", "rad_per_s",
-                                              "mm_per_s", "uN_per_m", "deg", "um", "us", "pg", "nN", "pN", "Pa", "J"};
+  static const std::vector<std::string> units{"pg_per_um2_per_us",
+                                              "um2_per_us",
+                                              "pg_per_um3",
+                                              "Pa_per_um",
+                                              "fJ_per_um2",
+                                              "N_s_per_m",
+                                              "rad_per_s",
+                                              "mm_per_s",
+                                              "uN_per_m",
+                                              "deg",
+                                              "um",
+                                              "us",
+                                              "pg",
+                                              "nN",
+                                              "pN",
+                                              "Pa",
+                                              "J"};
   const auto ends = [&](const std::string& unit) {
     const std::string end = "_" + unit;
     return key.size() > end.size() && key.compare(key.size() - end.size(), end.size(), end) == 0;
@@ -111,7 +127,8 @@ std::string unit_of(const std::string& key) {
   // What comes after the first "per" is below the line.
   std::string unit = *found;
   const auto put = [&](const std::string& from, const std::string& to, bool once) {
-    for (auto at = unit.find(from); at != std::string::npos; at = once ? std::string::npos : unit.find(from)) unit.replace(at, from.size(), to);
+    for (auto at = unit.find(from); at != std::string::npos; at = once ? std::string::npos : unit.find(from))
+      unit.replace(at, from.size(), to);
   };
   put("_per_", "/", true);
   put("_per_", " ", false);
@@ -140,12 +157,14 @@ std::string keys_text(const std::string& section) {
     if (!section.empty() && section != s.name) continue;
     text += fmt::format("\n{}{}\n", heading(s), s.listed ? "   as often as needed" : "");
     for (const auto& key : s.keys)
-      text += fmt::format("  {}: {}\n      {}; {}{}\n", key.key, key.what, key.allowed, default_text(key), key.only.empty() ? "" : "; " + key.only);
+      text += fmt::format("  {}: {}\n      {}; {}{}\n", key.key, key.what, key.allowed, default_text(key),
+                          key.only.empty() ? "" : "; " + key.only);
   }
   if (!section.empty() && std::find(names.begin(), names.end(), section) == names.end()) {
     const auto like = nearest(section, names);
-    throw InputError(fmt::format("keys {}: no such section; {}", section,
-                                 like.empty() ? fmt::format("there are {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
+    throw InputError(
+        fmt::format("keys {}: no such section; {}", section,
+                    like.empty() ? fmt::format("there are {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
   }
   return text;
 }
@@ -154,15 +173,18 @@ std::string keys_markdown() {
   std::string text =
       "# Keys of a case file\n\n"
       "Made by `corpuscle keys --markdown` from what the readers ask for; a test holds this page to it. A case file is TOML: sections in "
-      "brackets, of which those in double brackets are written as often as needed, and `key = value` lines. Before the first section may stand "
-      "`title`, a text in quotes. `--set section.key=value` overrides a key for one run (`--set cells.0.vertices=1000` for the first of a list), "
-      "`corpuscle check --resolved CASE` prints a case with every default filled in, and every run keeps that in its folder as `case.toml`. "
+      "brackets, of which those in double brackets are written as often as needed, and `key = value` lines. Before the first section may "
+      "stand "
+      "`title`, a text in quotes. `--set section.key=value` overrides a key for one run (`--set cells.0.vertices=1000` for the first of a "
+      "list), "
+      "`corpuscle check --resolved CASE` prints a case with every default filled in, and every run keeps that in its folder as "
+      "`case.toml`. "
       "A key that means nothing in a scene is refused or named with a warning, and one that is misspelt with what it is like.\n";
   for (const auto& s : list_keys()) {
     text += fmt::format("\n## `{}`\n\n| key | unit | what it says | allowed | default |\n|---|---|---|---|---|\n", heading(s));
     for (const auto& key : s.keys)
-      text += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", key.key, unit_of(key.key), key.what, key.allowed, key.only.empty() ? "" : "; " + key.only,
-                          key.value.empty() ? (key.optional ? "none" : "required") : key.value);
+      text += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", key.key, unit_of(key.key), key.what, key.allowed,
+                          key.only.empty() ? "" : "; " + key.only, key.value.empty() ? (key.optional ? "none" : "required") : key.value);
   }
   return text;
 }

@@ -9,13 +9,13 @@ namespace corpuscle {
 /// A key with its default and what is allowed.
 struct KeyRecord {
   std::string key, what, allowed;  // the name, what it says, what is allowed
-  std::string value;     // the default as TOML, "" if the key is required
-  bool optional = false; // without a default: may be left out
-  std::string only;      // where the key has no meaning: why, as the message there says
+  std::string value;               // the default as TOML, "" if the key is required
+  bool optional = false;           // without a default: may be left out
+  std::string only;                // where the key has no meaning: why, as the message there says
 };
 
 struct SectionRecord {
-  std::string name;   // "boundary"
+  std::string name;     // "boundary"
   bool listed = false;  // written [[name]], as often as needed
   std::vector<KeyRecord> keys;
 };

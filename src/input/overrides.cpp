@@ -38,15 +38,14 @@ toml::table parse_value(const std::string& override_text, const std::string& val
 }
 
 toml::table& section_of(toml::table& root, const std::string& text, const std::vector<std::string>& parts) {
-  const auto known = std::find_if(std::begin(section_names), std::end(section_names),
-                                  [&](const SectionName& s) { return s.name == parts[0]; });
+  const auto known =
+      std::find_if(std::begin(section_names), std::end(section_names), [&](const SectionName& s) { return s.name == parts[0]; });
   if (known == std::end(section_names)) {
     std::vector<std::string> names;
     for (const auto& s : section_names) names.emplace_back(s.name);
     const auto like = nearest(parts[0], names);
     refuse(text, fmt::format("there is no section '{}'; {}", parts[0],
-                             like.empty() ? fmt::format("known: {}", fmt::join(names, ", "))
-                                          : fmt::format("did you mean '{}'?", like)));
+                             like.empty() ? fmt::format("known: {}", fmt::join(names, ", ")) : fmt::format("did you mean '{}'?", like)));
   }
   if (parts.size() != (known->listed ? 3u : 2u))
     refuse(text, known->listed ? fmt::format("[[{0}]] is a list: write {0}.0.key=value for its first entry", parts[0])
@@ -61,8 +60,7 @@ toml::table& section_of(toml::table& root, const std::string& text, const std::v
   auto* list = node ? root.get(parts[0])->as_array() : nullptr;
   const bool digits = !parts[1].empty() && parts[1].size() < 9 &&
                       std::all_of(parts[1].begin(), parts[1].end(), [](char c) { return c >= '0' && c <= '9'; });
-  if (!digits)
-    refuse(text, fmt::format("'{}' is not the number of an entry: write {}.0.{}=value", parts[1], parts[0], parts[2]));
+  if (!digits) refuse(text, fmt::format("'{}' is not the number of an entry: write {}.0.{}=value", parts[1], parts[0], parts[2]));
   const std::size_t index = std::stoul(parts[1]);
   const std::size_t size = list ? list->size() : 0;
   auto* entry = index < size ? list->get(index)->as_table() : nullptr;
@@ -76,8 +74,7 @@ std::map<std::string, std::string> apply_overrides(toml::table& root, const std:
   std::map<std::string, std::string> set;
   for (const auto& text : overrides) {
     const auto equals = text.find('=');
-    if (equals == std::string::npos || equals == 0)
-      refuse(text, "write section.key=value, for example time.step_us=0.5");
+    if (equals == std::string::npos || equals == 0) refuse(text, "write section.key=value, for example time.step_us=0.5");
     const auto path = text.substr(0, equals);
     const auto parts = split(path);
     if (std::any_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); }))

@@ -15,9 +15,9 @@ struct SectionName {
   bool listed;
 };
 inline constexpr SectionName section_names[] = {
-    {"time", false},   {"grid", false},    {"fluid", false},    {"boundary", true},    {"cell_types", true}, {"cells", true},
-    {"populations", true}, {"bodies", true},  {"contact", false}, {"coupling", false}, {"blood", false}, {"stretching", false},
-    {"output", false},
+    {"time", false},  {"grid", false},       {"fluid", false},  {"boundary", true}, {"cell_types", true},
+    {"cells", true},  {"populations", true}, {"bodies", true},  {"contact", false}, {"coupling", false},
+    {"blood", false}, {"stretching", false}, {"output", false},
 };
 
 /// Put every override into the table. A section that the file lacks is added; an entry of a list must exist.

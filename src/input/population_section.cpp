@@ -12,7 +12,8 @@ void read_amount(Section& s, PopulationSettings& p) {
   constexpr int most_cells = 10000000;
   constexpr double most_hematocrit = 0.8;
   if (s.recording()) {
-    s.describe({"hematocrit", "Share of the fluid's volume that the cells fill at the start."}, "a number above 0 and up to 0.8; or count", "");
+    s.describe({"hematocrit", "Share of the fluid's volume that the cells fill at the start."}, "a number above 0 and up to 0.8; or count",
+               "");
     s.describe({"count", "How many cells there are."}, "a whole number; or hematocrit", "");
     return;
   }
@@ -22,7 +23,9 @@ void read_amount(Section& s, PopulationSettings& p) {
     p.count = s.integer({"count", "How many cells of the type there are."}, 1, most_cells);
     return;
   }
-  if (!given) return s.require({"hematocrit", ""}, "a number above 0 and up to 0.8 (share of the fluid's volume), or count: how many cells there are");
+  if (!given)
+    return s.require({"hematocrit", ""},
+                     "a number above 0 and up to 0.8 (share of the fluid's volume), or count: how many cells there are");
   p.hematocrit = s.number({"hematocrit", "Share of the fluid's volume that the cells fill."}, positive(most_hematocrit));
 }
 
@@ -50,10 +53,11 @@ PopulationSettings read_population(Section& s, const std::vector<CellTypeSetting
     p.type = read_type(s, types);
   }
   read_amount(s, p);
-  p.seed = s.integer({"seed", "Seed of the random places; the same seed gives the same places on any number of ranks."}, 0, 2000000000, p.seed);
+  p.seed =
+      s.integer({"seed", "Seed of the random places; the same seed gives the same places on any number of ranks."}, 0, 2000000000, p.seed);
   p.gap_um = s.number({"gap_um", "Least distance of the population's cells from any other surface at the start."}, between(0, 2), p.gap_um);
-  p.orientation =
-      s.choice<Orientation>({"orientation", "How the cells' axes point at the start."}, {{"random", Orientation::random}, {"aligned", Orientation::aligned}}, p.orientation);
+  p.orientation = s.choice<Orientation>({"orientation", "How the cells' axes point at the start."},
+                                        {{"random", Orientation::random}, {"aligned", Orientation::aligned}}, p.orientation);
   if (p.orientation == Orientation::aligned)
     p.axis = read_axis(s);
   else

@@ -24,7 +24,9 @@ Bounds positive(double high) {
 Bounds not_negative(double high) {
   return {0, high, false, high < 1e300 ? "a number from 0 to " + limit_text(high) : "a number, 0 or more"};
 }
-Bounds between(double low, double high) { return {low, high, false, fmt::format("a number from {} to {}", limit_text(low), limit_text(high))}; }
+Bounds between(double low, double high) {
+  return {low, high, false, fmt::format("a number from {} to {}", limit_text(low), limit_text(high))};
+}
 
 std::string toml_text(const std::string& text) {
   std::string quoted = "\"";
@@ -41,9 +43,7 @@ std::string toml_text(const std::string& text) {
   return quoted + '"';
 }
 std::string toml_text(double value) { return fmt::format("{}", value); }
-std::string toml_text(const double* values, std::size_t n) {
-  return fmt::format("[{}]", fmt::join(values, values + n, ", "));
-}
+std::string toml_text(const double* values, std::size_t n) { return fmt::format("[{}]", fmt::join(values, values + n, ", ")); }
 namespace {
 
 std::string whole_text(const toml::node& node) {
@@ -163,8 +163,8 @@ std::array<int, 3> Section::integers(const Key& wanted, int low, int high) {
 template <std::size_t N>
 std::vector<std::array<double, N>> Section::rows(const Key& wanted, std::size_t min_rows) {
   const std::string& key = wanted.name;
-  const auto allowed = fmt::format("a list of {} or more rows of {} numbers, such as [[{}], ...]", min_rows, N,
-                                   N == 2 ? "0, 1" : "0, 0, 1");
+  const auto allowed =
+      fmt::format("a list of {} or more rows of {} numbers, such as [[{}], ...]", min_rows, N, N == 2 ? "0, 1" : "0, 0, 1");
   std::vector<std::array<double, N>> values;
   record(wanted, allowed, "", true);
   const auto* found = node(key);
@@ -237,8 +237,8 @@ void Section::finish() {
       const auto like = nearest(name, known_);
       const bool unit = !like.empty() && without_unit(like) == without_unit(name);
       if (like.empty()) fail(name, fmt::format("unknown key; known here: {}", fmt::join(known_, ", ")));
-      fail(name, fmt::format("unknown key; did you mean '{}'?{}", like,
-                             unit ? " The unit is part of the name: convert the value to it." : ""));
+      fail(name,
+           fmt::format("unknown key; did you mean '{}'?{}", like, unit ? " The unit is part of the name: convert the value to it." : ""));
     }
   }
   if (missing_.empty()) return;
@@ -280,8 +280,7 @@ std::size_t Section::word(const Key& wanted, const std::vector<std::string>& nam
   const auto* found = node(key);
   if (!found && fallback >= names.size()) {
     for (const auto& [other, value] : table_ ? *table_ : toml::table{})
-      if (nearest(other.str(), {key}) == key)
-        fail(std::string(other.str()), fmt::format("unknown key; did you mean '{}'?", key));
+      if (nearest(other.str(), {key}) == key) fail(std::string(other.str()), fmt::format("unknown key; did you mean '{}'?", key));
     fail(key, "required key is missing; it must be " + allowed);
   }
   if (found) {

@@ -41,10 +41,10 @@ struct Key {
 
 /// What a reader asks of a section, gathered while it reads an empty one.
 struct KeyRecorder {
-  std::map<std::string, std::size_t> chosen;                 // which word the reader is to find for each choice
-  std::map<std::string, std::vector<std::string>> choices;   // those it has asked for, with their words
+  std::map<std::string, std::size_t> chosen;                // which word the reader is to find for each choice
+  std::map<std::string, std::vector<std::string>> choices;  // those it has asked for, with their words
   std::vector<KeyRecord> keys;
-  std::map<std::string, std::string> unused;                 // keys without meaning in this run, and why
+  std::map<std::string, std::string> unused;  // keys without meaning in this run, and why
 };
 /// Thrown where a reader refuses the values that it was given by a recorder.
 struct RecordingEnds {};
@@ -80,8 +80,7 @@ class Section {
 
   /// One of several words. Without a fallback a missing key is reported at once, since it decides which others exist.
   template <class E>
-  E choice(const Key& key, const std::vector<std::pair<std::string, E>>& words,
-           std::optional<E> fallback = {}) {
+  E choice(const Key& key, const std::vector<std::pair<std::string, E>>& words, std::optional<E> fallback = {}) {
     std::vector<std::string> names;
     for (const auto& [name, value] : words) names.push_back(name);
     std::size_t chosen = words.size();
@@ -114,8 +113,7 @@ class Section {
   void record(const Key& key, const std::string& allowed, const std::string& value, bool optional);
   std::size_t word(const Key& key, const std::vector<std::string>& names, std::size_t fallback);
   double number_in(const std::string& key, const toml::node& node, const Bounds& allowed) const;
-  std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count,
-                                 const std::string& allowed) const;
+  std::vector<double> numbers_in(const std::string& key, const toml::node& node, std::size_t count, const std::string& allowed) const;
   std::string where(const std::string& key) const;
   void know(const std::string& key);
   void miss(const std::string& key, const std::string& allowed) { missing_.emplace_back(key, allowed); }

@@ -21,8 +21,7 @@ constexpr Usual area_modulus{1, 5e5, 50, "uN/m", "models and real membranes have
 constexpr Usual bending_modulus{1e-19, 1e-18, 50, "J", "red cells have", "1 k T = 4e-21 J, 1 fJ = 1e-15 J"};
 constexpr Usual membrane_viscosity{1e-9, 1e-6, 50, "N s/m", "red cells have", "1 uN s/m = 1e-6 N s/m, 1 dyn s/cm = 1e-3 N s/m"};
 constexpr Usual mass{27, 10000, 50, "pg", "cells have", "1 ng = 1000 pg, 1 kg = 1e15 pg"};
-constexpr Usual density{0.7, 2, 10, "pg/um3", "watery fluids have about 1, all fluids",
-                        "1000 kg/m3 = 1 g/cm3 = 1 pg/um3"};
+constexpr Usual density{0.7, 2, 10, "pg/um3", "watery fluids have about 1, all fluids", "1000 kg/m3 = 1 g/cm3 = 1 pg/um3"};
 constexpr Usual pressure_gradient{0, 10, 100, "Pa/um", "vessels have", "1 mmHg/mm = 0.133 Pa/um, 1 kPa/mm = 1 Pa/um"};
 constexpr Usual push{0, 1, 50, "nN", "tweezers and pipettes have", "1 pN = 0.001 nN, 1 uN = 1000 nN"};
 constexpr Usual kinematic_viscosity{0.5, 100, 50, "um2/us", "plasma has about 1.1, thickened media", "1e-6 m2/s = 1 mm2/s = 1 um2/us"};

@@ -6,9 +6,7 @@
 
 namespace corpuscle {
 
-double uniform_edge_length(double area_um2, int vertices) {
-  return std::sqrt(4 * area_um2 / (std::sqrt(3.0) * (2.0 * vertices - 4)));
-}
+double uniform_edge_length(double area_um2, int vertices) { return std::sqrt(4 * area_um2 / (std::sqrt(3.0) * (2.0 * vertices - 4))); }
 
 double spontaneous_angle(int vertices) {
   constexpr double pi = 3.14159265358979323846;
@@ -32,8 +30,6 @@ double persistence_times_length(double shear_modulus_nN_per_um, double kT_fJ) {
   return kT_fJ * shear_modulus_over_stiffness() / shear_modulus_nN_per_um;
 }
 
-double DpdScaling::time() const {
-  return std::pow(length() * (viscosity_SI / viscosity_model) / energy_per_area(), exponent);
-}
+double DpdScaling::time() const { return std::pow(length() * (viscosity_SI / viscosity_model) / energy_per_area(), exponent); }
 
 }  // namespace corpuscle

@@ -51,16 +51,15 @@ std::vector<ExperimentPoint> read_experiment(const std::string& path) {
       continue;
     }
     if (fields.size() != names.size()) {
-      throw InputError(
-          fmt::format("{}, line {}: {} values under {} columns", path, number_of_line, fields.size(), names.size()));
+      throw InputError(fmt::format("{}, line {}: {} values under {} columns", path, number_of_line, fields.size(), names.size()));
     }
     std::map<std::string, double> row;
     for (std::size_t k = 0; k < names.size(); ++k) row[names[k]] = number(path, number_of_line, names[k], fields[k]);
     for (const auto& name : wanted) {
       if (!row.count(name)) throw InputError(fmt::format("{}: there is no column {}", path, name));
     }
-    points.push_back({row["force_pN"], row["transverse_um"], row["axial_um"], row["transverse_lo_um"],
-                      row["transverse_hi_um"], row["axial_lo_um"], row["axial_hi_um"]});
+    points.push_back({row["force_pN"], row["transverse_um"], row["axial_um"], row["transverse_lo_um"], row["transverse_hi_um"],
+                      row["axial_lo_um"], row["axial_hi_um"]});
   }
   if (points.empty()) throw InputError(fmt::format("experiment file {}: holds no measurement", path));
   return points;
@@ -88,8 +87,7 @@ ExperimentComparison compare(const StretchingResult& result, const std::vector<E
   c.interpolation_um = interpolation_error(steps);
   for (const ExperimentPoint& p : experiment) {
     if (p.force_pN < steps.front().force_pN || p.force_pN > steps.back().force_pN) continue;
-    const auto upper = std::find_if(steps.begin() + 1, steps.end() - 1,
-                                    [&](const StretchingStep& s) { return s.force_pN >= p.force_pN; });
+    const auto upper = std::find_if(steps.begin() + 1, steps.end() - 1, [&](const StretchingStep& s) { return s.force_pN >= p.force_pN; });
     const auto lower = upper - 1;
     const double w = (p.force_pN - lower->force_pN) / (upper->force_pN - lower->force_pN);
     const double axial = (1 - w) * lower->axial_um + w * upper->axial_um;
@@ -97,8 +95,8 @@ ExperimentComparison compare(const StretchingResult& result, const std::vector<E
     ++c.points;
     c.rms_axial_um += (axial - p.axial_um) * (axial - p.axial_um);
     c.rms_transverse_um += (transverse - p.transverse_um) * (transverse - p.transverse_um);
-    c.inside_both += axial >= p.axial_lo_um && axial <= p.axial_hi_um && transverse >= p.transverse_lo_um &&
-                     transverse <= p.transverse_hi_um;
+    c.inside_both +=
+        axial >= p.axial_lo_um && axial <= p.axial_hi_um && transverse >= p.transverse_lo_um && transverse <= p.transverse_hi_um;
   }
   if (c.points > 0) {
     c.rms_axial_um = std::sqrt(c.rms_axial_um / c.points);

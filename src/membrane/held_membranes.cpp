@@ -53,7 +53,8 @@ std::vector<CellPart> cut(int cells, const std::vector<int>& first_vertex, const
   const int count = std::max(1, std::min(most, cells / smallest));
   std::vector<CellPart> parts;
   for (int p = 0; p < count; ++p) {
-    const int first = static_cast<int>(static_cast<long>(cells) * p / count), last = static_cast<int>(static_cast<long>(cells) * (p + 1) / count);
+    const int first = static_cast<int>(static_cast<long>(cells) * p / count),
+              last = static_cast<int>(static_cast<long>(cells) * (p + 1) / count);
     parts.push_back({first, last - first, first_vertex[first], first_vertex[last] - first_vertex[first], first_triangle[first],
                      first_triangle[last] - first_triangle[first]});
   }

@@ -19,8 +19,7 @@ PrincipalAxes principal_axes(const TriangleMesh& mesh) {
     volume += v;
     first += v / 4 * sum;
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        second[i][j] += v / 20 * (sum[i] * sum[j] + k[0][i] * k[0][j] + k[1][i] * k[1][j] + k[2][i] * k[2][j]);
+      for (int j = 0; j < 3; ++j) second[i][j] += v / 20 * (sum[i] * sum[j] + k[0][i] * k[0][j] + k[1][i] * k[1][j] + k[2][i] * k[2][j]);
   }
   const Vec3 centre = (1 / volume) * first;
   double a[3][3];

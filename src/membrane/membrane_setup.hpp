@@ -13,8 +13,7 @@ namespace corpuscle {
 
 /// @param surface       its first bodies are the cells
 /// @param type_of_cell  [cell] index into types
-MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types,
-                                  const std::vector<int>& type_of_cell);
+MembraneViews make_membrane_views(const SurfaceSet& surface, const std::vector<CellReference>& types, const std::vector<int>& type_of_cell);
 
 /// The rest states of all types as if their cells were `size` times as large.
 void fill_reference(MembraneViews& m, const std::vector<CellReference>& types, double size = 1);

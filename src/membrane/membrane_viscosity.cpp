@@ -71,7 +71,9 @@ void MembraneViscosity::divide_scratch(const MembraneViews& m, double* memory) {
     return from;
   };
   const int first_entry = 3 * m.first_triangle;
-  const auto take_vectors = [&] { return RowsFrom<Components<double>>{Components<double>(take(3 * vertices), vertices, 3), m.first_vertex}; };
+  const auto take_vectors = [&] {
+    return RowsFrom<Components<double>>{Components<double>(take(3 * vertices), vertices, 3), m.first_vertex};
+  };
   views_.inverse_length = {Array<double>(take(entries), entries), first_entry};
   views_.neighbour = {Array<int>(reinterpret_cast<int*>(take((entries + 1) / 2)), entries), first_entry};
   views_.diagonal = {Array<double>(take(vertices), vertices), m.first_vertex};
@@ -116,8 +118,7 @@ void MembraneViscosity::resist_with(const MembraneViews& m, const FluidReaction&
     resist_with<CentralDamping>(m, fluid, damping);
 }
 
-void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead,
-                               const Components<double>& force) {
+void MembraneViscosity::resist(const MembraneViews& m, Workspace& workspace, double beta, double ahead, const Components<double>& force) {
   double* const memory = workspace.reserve(scratch_numbers(m));
   for_parts(m, parts_, [&](const MembraneViews& part) {
     divide_scratch(part, memory);

@@ -51,8 +51,7 @@ class MembraneViscosity {
   void reserve(const MembraneViews& m, Workspace& workspace) const { workspace.reserve(scratch_numbers(m)); }
 
   /// Dissipative force for velocities v [vertex, 3] at the present positions, nN, into `force` [vertex, 3].
-  void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v,
-             const Components<double>& force) const;
+  void force(const MembraneViews& m, const Elasticity& elasticity, const Components<double>& v, const Components<double>& force) const;
 
   /// Power that it takes from the membranes at their present velocities, nW.
   double dissipation(const MembraneViews& m) const;
@@ -76,9 +75,9 @@ class MembraneViscosity {
   bool tangential_;
   double share_ = 0;
   Components<double> given_, past_;  // [vertex, 3] nN; only with hold()
-  Components<float> taken_;   // [vertex, 3] nN, what the last resist() took off, of which only the power is told; only with hold()
-  std::vector<CellPart> parts_;  // only with hold(): else all cells at once
-  Array<double> scratch_;     // without hold(): else it lies in the workspace
+  Components<float> taken_;          // [vertex, 3] nN, what the last resist() took off, of which only the power is told; only with hold()
+  std::vector<CellPart> parts_;      // only with hold(): else all cells at once
+  Array<double> scratch_;            // without hold(): else it lies in the workspace
   ViscosityViews views_;
   ViscousBand band_;  // without teams: conjugate gradients
 };

@@ -45,8 +45,8 @@ CellTypes find_cell_types(const std::vector<CellSettings>& cells) {
   CellTypes types;
   std::vector<const CellSettings*> representative;
   for (const CellSettings& cell : cells) {
-    const auto known = std::find_if(representative.begin(), representative.end(),
-                                    [&](const CellSettings* other) { return same_type(cell, *other); });
+    const auto known =
+        std::find_if(representative.begin(), representative.end(), [&](const CellSettings* other) { return same_type(cell, *other); });
     types.of_cell.push_back(int(known - representative.begin()));
     if (known != representative.end()) continue;
     representative.push_back(&cell);
@@ -184,8 +184,7 @@ void Membranes::take_substeps(int count, double dt, const Load& load) {
   }
 }
 
-void Membranes::take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
-                              const Components<double>& v_star) {
+void Membranes::take_substeps(int count, double dt, const SurfaceStress& stress, double beta, const Components<double>& v_star) {
   if (stress.values.extent(0) == 0) {
     take_substeps(count, dt, NoLoad{});
   } else if (beta == 0) {
@@ -195,8 +194,7 @@ void Membranes::take_substeps(int count, double dt, const SurfaceStress& stress,
   }
 }
 
-int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta,
-                       const Components<double>& v_star) {
+int Membranes::advance(double dt_us, const SurfaceStress& stress, double beta, const Components<double>& v_star) {
   if (views_.cells == 0) return 0;
   if (beta > 0 && (stress.values.extent(0) == 0 || v_star.extent(0) == 0)) {
     throw ComputationError("membrane: an anticipated reaction (beta > 0) needs both stress and v_star");
@@ -304,8 +302,8 @@ double Membranes::largest_resistance(const MobilityModel& model, const std::vect
       [&](int c, int first, int last, const StiffnessViews& work) { apply_mobility(views_, model, c, first, last, work); });
 }
 
-/// Power iteration on (R + D) under stiffness, R what MembraneViscosity takes for the fluid's resistance, times twice D over R + D: what D does
-/// not resist, as waves across the membrane, is of no account.
+/// Power iteration on (R + D) under stiffness, R what MembraneViscosity takes for the fluid's resistance, times twice D over R + D: what D
+/// does not resist, as waves across the membrane, is of no account.
 double Membranes::fastest_held_relaxation_per_us(const std::vector<int>& numbers, double beta) {
   const std::vector<int> cells = cells_of(numbers);
   if (cells.empty() || !viscosity_ || !workspace_ || beta <= 0) return 0;
@@ -353,9 +351,7 @@ double Membranes::fastest_relaxation(const MobilityModel& model, const std::vect
       [&](int c, int first, int last, const StiffnessViews& work) { apply_mobility(views_, model, c, first, last, work); });
 }
 
-int Membranes::trouble() {
-  return status_host_.read()(0) - 1;
-}
+int Membranes::trouble() { return status_host_.read()(0) - 1; }
 
 void Membranes::explain_area(int cell, double drift) const {
   throw ComputationError(fmt::format(
@@ -386,22 +382,21 @@ void Membranes::explain(int cell, double dt) {
   const CellDiagnostics before = diagnostics()[cell];
   const std::string reached = stretch_text(law_[cell], now.stretch);
   const std::string was = dt > 0 ? fmt::format(" ({} before)", stretch_text(law_[cell], before.stretch)) : "";
-  const std::string where = fmt::format("{} at ({:.2f}, {:.2f}, {:.2f}) um", name(cell), before.centroid_um[0],
-                                        before.centroid_um[1], before.centroid_um[2]);
+  const std::string where =
+      fmt::format("{} at ({:.2f}, {:.2f}, {:.2f}) um", name(cell), before.centroid_um[0], before.centroid_um[1], before.centroid_um[2]);
   const char* robin = drifts_ ? "" : " or coupling.robin_coefficient_pg_per_um2_per_us";
   const std::string step =
-      dt > 0 ? fmt::format(" within a step of {:.3g} us, even in {} times as many sub-steps", dt, 1 << most_retries)
-             : std::string();
+      dt > 0 ? fmt::format(" within a step of {:.3g} us, even in {} times as many sub-steps", dt, 1 << most_retries) : std::string();
   if (finite) {
-    throw ComputationError(fmt::format(
-        "membrane overstretched: {}: {}{}{}. The load is too large or the coupling unstable: reduce time.step_us or the "
-        "load, or raise its shear_modulus_uN_per_m{}",
-        where, reached, step, was, robin));
+    throw ComputationError(
+        fmt::format("membrane overstretched: {}: {}{}{}. The load is too large or the coupling unstable: reduce time.step_us or the "
+                    "load, or raise its shear_modulus_uN_per_m{}",
+                    where, reached, step, was, robin));
   }
-  throw ComputationError(fmt::format(
-      "membrane position is not finite: {}{}{}. The traction on it is not finite or the step too long: reduce "
-      "time.step_us{}{}",
-      where, step, was, drifts_ ? "" : ", or raise its mass_pg", robin));
+  throw ComputationError(
+      fmt::format("membrane position is not finite: {}{}{}. The traction on it is not finite or the step too long: reduce "
+                  "time.step_us{}{}",
+                  where, step, was, drifts_ ? "" : ", or raise its mass_pg", robin));
 }
 
 void Membranes::save_state() {

@@ -23,7 +23,7 @@ struct CellDiagnostics {
   Triple velocity_um_per_us{};    // mean over the vertices, which carry equal masses
   Triple lower_um{}, upper_um{};  // extremes along x, y, z
   double area_um2 = 0, volume_um3 = 0;
-  double rest_area_um2 = 0, rest_volume_um3 = 0;  // A0, V0
+  double rest_area_um2 = 0, rest_volume_um3 = 0;                                                // A0, V0
   double springs_fJ = 0, bending_fJ = 0, global_area_fJ = 0, local_area_fJ = 0, volume_fJ = 0;  // springs or another law
   double stretch = 0;  // largest strain of any triangle: of springs, length over contour length of a link, which breaks
                        // at 1; of a sheet, the larger principal stretch
@@ -49,7 +49,8 @@ CellTypes find_cell_types(const std::vector<CellSettings>& cells);
 class MembraneViscosity;
 
 /// Makes the elasticity of a rank's cells, of the types and the type of each; see ElasticityOf for one of a law of one's own.
-using ElasticityMaker = std::function<std::unique_ptr<Elasticity>(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell)>;
+using ElasticityMaker =
+    std::function<std::unique_ptr<Elasticity>(const std::vector<CellReference>& types, const std::vector<int>& type_of_cell)>;
 
 class Membranes {
  public:
@@ -157,8 +158,7 @@ class Membranes {
   /// @return the number of sub-steps taken
   /// @throws ComputationError  naming the cell, the quantity, the likely cause and the setting to change; positions and
   ///         velocities are then those from before the call
-  int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0,
-              const Components<double>& v_star = {});
+  int advance(double dt_us, const SurfaceStress& stress = {}, double beta = 0, const Components<double>& v_star = {});
 
   /// Begin a step of membranes that move with the fluid: put them where their last velocities bring them in `ahead_us`, the whole
   /// step or nothing.
@@ -173,8 +173,8 @@ class Membranes {
   double volume_taken();
   void give_volume_back();
 
-  /// Those of this rank's own cells that are in `numbers`, at the present shape and size, by themselves: what is asked of a few takes no longer
-  /// the more there are beside them. Only with hold(). The normals and areas of their surfaces are not yet known.
+  /// Those of this rank's own cells that are in `numbers`, at the present shape and size, by themselves: what is asked of a few takes no
+  /// longer the more there are beside them. Only with hold(). The normals and areas of their surfaces are not yet known.
   std::unique_ptr<Membranes> only(const std::vector<int>& numbers) const;
   /// Of `values` [vertex, 3] the rows of those cells, one after the other.
   Components<double> rows_of(const std::vector<int>& numbers, const Components<double>& values) const;
@@ -185,8 +185,8 @@ class Membranes {
   /// @param beta     of resist(), for membranes whose viscosity slows them down, but for hold() not at all; before the first step
   double fastest_relaxation_per_us(const MobilityModel& model, const std::vector<int>& numbers, double beta = 0);
 
-  /// Fastest rate at which a membrane relaxes against its own viscosity and what resist() takes for the fluid's resistance, times the square
-  /// of the former's share in what resists, 1/us; 0 without viscosity. As above.
+  /// Fastest rate at which a membrane relaxes against its own viscosity and what resist() takes for the fluid's resistance, times the
+  /// square of the former's share in what resists, 1/us; 0 without viscosity. As above.
   double fastest_held_relaxation_per_us(const std::vector<int>& numbers, double beta);
 
   /// Largest ratio of membrane viscosity to what the fluid answers to a wave along a membrane; 0 without cells or viscosity. As above.
@@ -224,8 +224,7 @@ class Membranes {
   void take_workspace();
   void take_geometry();
   void estimate_stiffness();
-  void take_substeps(int count, double dt, const SurfaceStress& stress, double beta,
-                     const Components<double>& v_star);
+  void take_substeps(int count, double dt, const SurfaceStress& stress, double beta, const Components<double>& v_star);
   template <class Load>
   void take_substeps(int count, double dt, const Load& load);
   int trouble();
@@ -245,10 +244,10 @@ class Membranes {
   MotionViews motion_;
   HostCopy<Array<int>> status_host_;
   std::vector<CellReference> types_;
-  SurfaceSet templates_;                         // one body for each type; only with hold()
-  std::shared_ptr<Workspace> workspace_;         // of corner forces and directions; only with hold()
-  std::vector<CellPart> parts_;                  // for what takes memory for one part at a time; only with hold()
-  std::vector<int> number_;                      // [cell] in the whole scene
+  SurfaceSet templates_;                  // one body for each type; only with hold()
+  std::shared_ptr<Workspace> workspace_;  // of corner forces and directions; only with hold()
+  std::vector<CellPart> parts_;           // for what takes memory for one part at a time; only with hold()
+  std::vector<int> number_;               // [cell] in the whole scene
   CellNames names_;
   std::vector<bool> holds_area_;                 // [cell]
   Components<double> start_x_, start_v_;         // [vertex, 3] at the start of a call to advance
@@ -261,7 +260,7 @@ class Membranes {
   double size_ = 1;                              // of the cells at rest: see rest_at_size()
   double share_ahead_ = 0;                       // of the last velocities, in the present step's move
   bool resists_anew_ = false;
-  bool drifts_ = false;                          // set_out() and drift() move the membranes, not advance()
+  bool drifts_ = false;  // set_out() and drift() move the membranes, not advance()
   std::unique_ptr<Snapshot> saved_;
   std::unique_ptr<MembraneViscosity> viscosity_;  // only if a cell has any
 };

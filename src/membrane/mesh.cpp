@@ -40,16 +40,14 @@ void check_vertices(const TriangleMesh& mesh, const std::string& name) {
   for (int t = 0; t < int(mesh.triangles.size()); ++t) {
     for (int i : mesh.triangles[t]) {
       if (i < 0 || i >= n) {
-        refuse(name, fmt::format("triangle {} names vertex {}, but there are {} vertices", t, i, n),
-               "vertices are counted from 0");
+        refuse(name, fmt::format("triangle {} names vertex {}, but there are {} vertices", t, i, n), "vertices are counted from 0");
       }
       used[i] = 1;
     }
   }
   const auto lonely = std::find(used.begin(), used.end(), 0);
   if (lonely != used.end()) {
-    refuse(name, fmt::format("vertex {} is isolated: no triangle uses it", lonely - used.begin()),
-           "remove unused vertices");
+    refuse(name, fmt::format("vertex {} is isolated: no triangle uses it", lonely - used.begin()), "remove unused vertices");
   }
 }
 
@@ -59,8 +57,7 @@ void check_areas(const TriangleMesh& mesh, const std::string& name) {
     const auto& c = mesh.triangles[t];
     // 1e-9 of the mean area: edges would differ by more than four orders of magnitude, beyond any usable mesh.
     if (!(norm(area_vector(mesh, c)) > 1e-9 * mean)) {
-      refuse(name,
-             fmt::format("triangle {} (vertices {}, {}, {}) is degenerate: its area is zero", t, c[0], c[1], c[2]),
+      refuse(name, fmt::format("triangle {} (vertices {}, {}, {}) is degenerate: its area is zero", t, c[0], c[1], c[2]),
              "remove it or merge its vertices");
     }
   }
@@ -81,8 +78,8 @@ void check_edges(const TriangleMesh& mesh, const std::string& name) {
     }
     if (sides[s].rising == sides[s + 1].rising) {
       refuse(name,
-             fmt::format("inconsistent orientation: triangles {} and {} run along {} in the same direction",
-                         sides[s].triangle, sides[s + 1].triangle, where),
+             fmt::format("inconsistent orientation: triangles {} and {} run along {} in the same direction", sides[s].triangle,
+                         sides[s + 1].triangle, where),
              "reverse the vertex order of one of them, all must be counter-clockwise seen from outside");
     }
   }
@@ -170,8 +167,7 @@ void check_closed_surface(const TriangleMesh& mesh, const std::string& name) {
 TriangleMesh transform(const TriangleMesh& mesh, const Triple& axis, double spin_deg, const Triple& center) {
   const double length = norm(vec(axis));
   if (!(length > 0) || !std::isfinite(length)) {
-    throw InputError(
-        fmt::format("axis = [{}, {}, {}]: it must have a length; give e.g. [0, 0, 1]", axis[0], axis[1], axis[2]));
+    throw InputError(fmt::format("axis = [{}, {}, {}]: it must have a length; give e.g. [0, 0, 1]", axis[0], axis[1], axis[2]));
   }
   const Vec3 a = vec(axis) * (1 / length);
   const double cos_spin = std::cos(spin_deg * units::degree), sin_spin = std::sin(spin_deg * units::degree);
@@ -197,8 +193,7 @@ std::vector<std::array<int, 3>> triangle_neighbours(const TriangleMesh& mesh) {
   return neighbours;
 }
 
-std::vector<std::vector<int>> vertex_rings(const TriangleMesh& mesh,
-                                           const std::vector<std::array<int, 3>>& neighbours) {
+std::vector<std::vector<int>> vertex_rings(const TriangleMesh& mesh, const std::vector<std::array<int, 3>>& neighbours) {
   std::vector<std::vector<int>> rings(mesh.vertices.size());
   for (int first = 0; first < int(mesh.triangles.size()); ++first) {
     for (int i : mesh.triangles[first]) {

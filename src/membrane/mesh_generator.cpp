@@ -24,14 +24,13 @@ void check(const TriangleMesh& mesh, const SurfaceShape& shape, int vertices) {
   // 200 vertices, where edge^2 is 0.6 % of the area); a folded mesh is off by tens of per cent.
   const double allowed = 0.005 + 12 * edge2 / shape.area();
   const bool good = int(mesh.vertices.size()) == vertices && int(mesh.triangles.size()) == 2 * vertices - 4 &&
-                    std::abs(area(mesh) / shape.area() - 1) < allowed &&
-                    std::abs(volume(mesh) / shape.volume() - 1) < allowed && q.valence_min >= 4 && q.valence_max <= 8;
+                    std::abs(area(mesh) / shape.area() - 1) < allowed && std::abs(volume(mesh) / shape.volume() - 1) < allowed &&
+                    q.valence_min >= 4 && q.valence_max <= 8;
   if (!good) {
     throw ComputationError(fmt::format(
         "mesh generator: {} vertices, {} triangles, area {:.4g} of {:.4g} um2, volume {:.4g} of {:.4g} um3, valence {} "
         "to {}; ask for a slightly different number of vertices",
-        mesh.vertices.size(), mesh.triangles.size(), area(mesh), shape.area(), volume(mesh), shape.volume(),
-        q.valence_min, q.valence_max));
+        mesh.vertices.size(), mesh.triangles.size(), area(mesh), shape.area(), volume(mesh), shape.volume(), q.valence_min, q.valence_max));
   }
 }
 

@@ -30,9 +30,7 @@ bool is_text(const std::string& content) {
 }
 
 /// The first word outside comments, in lower case.
-std::string first_word(const std::string& path, const std::string& content) {
-  return MeshText(path, content.substr(0, 65536), '#').peek();
-}
+std::string first_word(const std::string& path, const std::string& content) { return MeshText(path, content.substr(0, 65536), '#').peek(); }
 
 /// "off", with letters before it for what its vertices have beside coordinates.
 bool is_off_keyword(const std::string& word) {
@@ -81,8 +79,10 @@ MeshFile read_mesh(const std::string& path) {
   if (stl || is_open(file.mesh)) merge_coincident(file.mesh);
   const std::size_t after = file.mesh.vertices.size();
   if (!stl && after < before)
-    file.notes.push_back(fmt::format("its triangles do not share their corners: of {} vertices {} coincided with others and "
-                                     "were merged with them", before, before - after));
+    file.notes.push_back(
+        fmt::format("its triangles do not share their corners: of {} vertices {} coincided with others and "
+                    "were merged with them",
+                    before, before - after));
   drop_collapsed(file);
   return file;
 }

@@ -34,9 +34,7 @@ class FlipMesh {
   }
 
  private:
-  int corner_facing(int t, int other) const {
-    return neighbour_[t][0] == other ? 0 : (neighbour_[t][1] == other ? 1 : 2);
-  }
+  int corner_facing(int t, int other) const { return neighbour_[t][0] == other ? 0 : (neighbour_[t][1] == other ? 1 : 2); }
 
   double cotangent(int apex, int a, int b) const {
     const Vec3 u = at(a) - at(apex), v = at(b) - at(apex);
@@ -83,8 +81,7 @@ class FlipMesh {
 
 /// One step of springs of rest length `rest` on every edge; those longer than it pull only if `two_sided`.
 /// @return the largest move over the rest length
-double spring_step(TriangleMesh& mesh, const SurfaceShape& shape, double rest, double rate, bool two_sided,
-                   std::vector<Vec3>& force) {
+double spring_step(TriangleMesh& mesh, const SurfaceShape& shape, double rest, double rate, bool two_sided, std::vector<Vec3>& force) {
   std::fill(force.begin(), force.end(), Vec3{});
   const auto at = [&](int i) { return Vec3{mesh.vertices[i][0], mesh.vertices[i][1], mesh.vertices[i][2]}; };
   for (const auto& t : mesh.triangles) {

@@ -22,9 +22,7 @@ std::string_view unsigned_part(std::string_view word) {
 
 }  // namespace
 
-void refuse_mesh_file(const std::string& path, const std::string& what) {
-  throw InputError(fmt::format("mesh file {}: {}", path, what));
-}
+void refuse_mesh_file(const std::string& path, const std::string& what) { throw InputError(fmt::format("mesh file {}: {}", path, what)); }
 
 std::string lower_case(std::string_view word) {
   std::string lower(word);
@@ -46,8 +44,7 @@ MeshText::MeshText(const std::string& path, std::string text, char comment) : pa
       while (i < all.size() && all[i] != '\n' && all[i] != '\r') ++i;
     } else {
       const std::size_t start = i;
-      while (i < all.size() && all[i] != '\n' && all[i] != '\r' && !blank(all[i]) && (comment == 0 || all[i] != comment))
-        ++i;
+      while (i < all.size() && all[i] != '\n' && all[i] != '\r' && !blank(all[i]) && (comment == 0 || all[i] != comment)) ++i;
       words_.push_back({all.substr(start, i - start), line});
     }
   }
@@ -107,8 +104,6 @@ void MeshText::fail(const std::string& what) const {
   refuse_mesh_file(path_, fmt::format("line {}: {}", words_.empty() ? 1 : words_[at_ > 0 ? at_ - 1 : 0].line, what));
 }
 
-void MeshText::misplaced(std::string_view word, const char* what) const {
-  fail(fmt::format("'{}' stands where {} should", word, what));
-}
+void MeshText::misplaced(std::string_view word, const char* what) const { fail(fmt::format("'{}' stands where {} should", word, what)); }
 
 }  // namespace corpuscle

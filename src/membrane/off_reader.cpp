@@ -39,8 +39,7 @@ Triple read_vertex(MeshText& text, bool by_lines, long number, int& columns) {
 
 std::array<int, 3> read_face(MeshText& text, long number, long vertices) {
   const long corners = text.integer("the number of corners of a face");
-  if (corners != 3)
-    text.fail(fmt::format("face {} has {} corners; only triangles are taken: triangulate the surface", number, corners));
+  if (corners != 3) text.fail(fmt::format("face {} has {} corners; only triangles are taken: triangulate the surface", number, corners));
   std::array<int, 3> t;
   for (int& c : t) {
     const long vertex = text.integer("a vertex number");
@@ -66,8 +65,8 @@ MeshFile read_off(const std::string& path, const std::string& content) {
   // One line for each vertex and face is what files look like. It tells what belongs to a vertex beside its coordinates.
   const bool by_lines = !text.same_line() && text.lines_left() == vertices + faces;
   if (attributes && !by_lines)
-    text.fail(fmt::format("{} lines follow, but {} vertices and {} faces take {}: truncated, or the counts are wrong",
-                          text.lines_left(), vertices, faces, vertices + faces));
+    text.fail(fmt::format("{} lines follow, but {} vertices and {} faces take {}: truncated, or the counts are wrong", text.lines_left(),
+                          vertices, faces, vertices + faces));
   MeshFile file;
   int columns = 0;
   for (long i = 0; i < vertices; ++i) file.mesh.vertices.push_back(read_vertex(text, by_lines, i, columns));

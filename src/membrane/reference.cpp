@@ -31,14 +31,12 @@ CellLaw make_law(const CellSettings& c) {
   require(c, c.mass_pg > 0, "mass_pg", c.mass_pg, "must be positive; a real cell weighs 27 to 121 pg");
   require(c, c.shear_modulus_uN_per_m > 0, "shear_modulus_uN_per_m", c.shear_modulus_uN_per_m,
           "must be positive; a healthy cell has 4 to 10");
-  require(c, c.bending_modulus_fJ >= 0, "bending_modulus_fJ", c.bending_modulus_fJ,
-          "must not be negative; a healthy cell has 2.4e-4");
+  require(c, c.bending_modulus_fJ >= 0, "bending_modulus_fJ", c.bending_modulus_fJ, "must not be negative; a healthy cell has 2.4e-4");
   require(c, c.area_modulus_uN_per_m >= 0, "area_modulus_uN_per_m", c.area_modulus_uN_per_m, "must not be negative");
   require(c, c.volume_modulus_Pa >= 0, "volume_modulus_Pa", c.volume_modulus_Pa, "must not be negative");
   require(c, eta >= 0, "membrane_viscosity_N_s_per_m", c.membrane_viscosity_N_s_per_m,
           "must not be negative; measured values are about 0.5e-6");
-  require(c, c.local_area_modulus_uN_per_m >= 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m,
-          "must not be negative");
+  require(c, c.local_area_modulus_uN_per_m >= 0, "local_area_modulus_uN_per_m", c.local_area_modulus_uN_per_m, "must not be negative");
   require(c, c.law != CellSettings::Law::wlc_pow || c.local_area_modulus_uN_per_m > 0, "local_area_modulus_uN_per_m",
           c.local_area_modulus_uN_per_m,
           "must be positive with springs: without it triangles can collapse and the solution gets stuck; the model's value is "
@@ -60,11 +58,13 @@ CellLaw make_law(const CellSettings& c) {
 MembraneLaw make_in_plane_law(const CellSettings& c) {
   const double modulus = c.shear_modulus_uN_per_m * units::uN_per_m;
   switch (c.law) {
-    case CellSettings::Law::neo_hookean: return NeoHookean{{modulus}};
+    case CellSettings::Law::neo_hookean:
+      return NeoHookean{{modulus}};
     case CellSettings::Law::skalak:
       require(c, c.skalak_c >= 0, "skalak_c", c.skalak_c, "must not be negative; capsules have about 1, red cells 10 and more");
       return Skalak{{modulus, c.skalak_c}};
-    default: return WlcPow{{modulus / shear_modulus_over_stiffness()}};
+    default:
+      return WlcPow{{modulus / shear_modulus_over_stiffness()}};
   }
 }
 
@@ -126,16 +126,18 @@ void warn_of_squeezed(const CellReference& r, const CellSettings& cell) {
     least = std::min(least, ratio);
   }
   if (squeezed == 0) return;
-  warn("{}: {} of the {} triangles of the mesh have less than half of the area that they rest on (down to {:.2g} of it): they start squeezed, are pushed "
-       "open and bend less; use reference = \"shape\", or a mesh whose triangles are more alike",
-       constant_key(cell, "reference"), squeezed, r.mesh.triangles.size(), least);
+  warn(
+      "{}: {} of the {} triangles of the mesh have less than half of the area that they rest on (down to {:.2g} of it): they start "
+      "squeezed, are pushed "
+      "open and bend less; use reference = \"shape\", or a mesh whose triangles are more alike",
+      constant_key(cell, "reference"), squeezed, r.mesh.triangles.size(), least);
 }
 
 auto type_key(const CellSettings& c) {
-  return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align,
-                  c.mass_pg, c.law, c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation,
-                  c.shear_modulus_uN_per_m, c.bending_modulus_fJ, c.area_modulus_uN_per_m,
-                  c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m, c.viscosity_ratio, c.dissipation);
+  return std::tie(c.vertices, c.shape, c.diameter_um, c.radius_um, c.semi_axes_um, c.mesh, c.scale, c.recenter, c.align, c.mass_pg, c.law,
+                  c.skalak_c, c.reference, c.reference_reduced_volume, c.inflation, c.shear_modulus_uN_per_m, c.bending_modulus_fJ,
+                  c.area_modulus_uN_per_m, c.local_area_modulus_uN_per_m, c.volume_modulus_Pa, c.membrane_viscosity_N_s_per_m,
+                  c.viscosity_ratio, c.dissipation);
 }
 
 }  // namespace

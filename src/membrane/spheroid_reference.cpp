@@ -39,10 +39,7 @@ std::string remedy(const CellSettings& cell) {
 class Relaxation {
  public:
   Relaxation(const CellReference& reference, const CellSettings& cell)
-      : cell_(cell),
-        law_(reference.law),
-        volume_(reference.law.rest_volume),
-        modulus_(cell.shear_modulus_uN_per_m * units::uN_per_m) {
+      : cell_(cell), law_(reference.law), volume_(reference.law.rest_volume), modulus_(cell.shear_modulus_uN_per_m * units::uN_per_m) {
     CellReference held = reference;
     held.law.volume = law_.volume = std::max(law_.volume, least_volume_modulus);
     views_ = make_membrane_views(make_surface_set({held.mesh}), {held}, {0});
@@ -85,7 +82,7 @@ class Relaxation {
 
  private:
   static constexpr double least_volume_modulus = 0.248;  // kPa
-  static constexpr double residual = 1e-5;  // of a vertex's force over modulus and edge; a link 10 % too long has 0.2
+  static constexpr double residual = 1e-5;               // of a vertex's force over modulus and edge; a link 10 % too long has 0.2
   static constexpr double volume_tolerance = 1e-7;
   static constexpr double push_size = 0.02;  // of the radius
   static constexpr int most_rounds = 20, most_iterations = 30000;
@@ -104,11 +101,9 @@ class Relaxation {
   }
 
   [[noreturn]] void fail(double left, int iterations) const {
-    refuse(
-        cell_,
-        fmt::format("the cell does not come to rest ({} iterations; {:.2g} of shear modulus x edge left on a vertex, {:.2g} "
-                    "wanted)",
-                    iterations, left, residual));
+    refuse(cell_, fmt::format("the cell does not come to rest ({} iterations; {:.2g} of shear modulus x edge left on a vertex, {:.2g} "
+                              "wanted)",
+                              iterations, left, residual));
   }
 
   const CellSettings& cell_;
@@ -122,11 +117,7 @@ RelaxedShape measure_relaxed(const TriangleMesh& mesh, int iterations) {
   const DiscShape disc = disc_shape(mesh);
   const PrincipalAxes axes = principal_axes(mesh);
   const auto along = parachute_measures(mesh, axes.centroid, {0, 0, 1});
-  return {iterations,
-          disc.diameter_um,
-          disc.thickness_center_um,
-          disc.thickness_max_um,
-          {along.rear_hollow_um, along.front_dimple_um}};
+  return {iterations, disc.diameter_um, disc.thickness_center_um, disc.thickness_max_um, {along.rear_hollow_um, along.front_dimple_um}};
 }
 
 void report(const CellSettings& cell, const RelaxedShape& s) {
@@ -134,8 +125,8 @@ void report(const CellSettings& cell, const RelaxedShape& s) {
       "{} on a spheroid of reduced volume {:g}: at rest after {} iterations as a disc of {:.2f} um, {:.2f} um thick at its "
       "centre "
       "and {:.2f} at most, dimples of {:.2f} and {:.2f} um",
-      constant_key(cell, "reference"), cell.reference_reduced_volume, s.iterations, s.diameter, s.thickness_center,
-      s.thickness_max, s.dimple[0], s.dimple[1]);
+      constant_key(cell, "reference"), cell.reference_reduced_volume, s.iterations, s.diameter, s.thickness_center, s.thickness_max,
+      s.dimple[0], s.dimple[1]);
   if (s.biconcave())
     info("{}", what);
   else
@@ -188,8 +179,7 @@ void rest_on_spheroid(CellReference& r, const CellSettings& cell) {
   relaxation.push();
   iterations += relaxation.run();
   r.mesh = relaxation.mesh();
-  if (find_self_crossing(r.mesh))
-    refuse(cell, fmt::format("the cell comes to rest passing through itself ({} iterations)", iterations));
+  if (find_self_crossing(r.mesh)) refuse(cell, fmt::format("the cell comes to rest passing through itself ({} iterations)", iterations));
   r.relaxed = measure_relaxed(r.mesh, iterations);
   report(cell, *r.relaxed);
 }

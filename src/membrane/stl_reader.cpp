@@ -97,8 +97,8 @@ MeshFile read_binary_stl(const std::string& path, const std::string& content) {
     for (int k = 0; k < 9; ++k) {
       corners[k / 3][k % 3] = values[3 + k];
       if (!std::isfinite(values[3 + k]))
-        refuse_mesh_file(path, fmt::format("damaged: a coordinate of triangle {} (at byte {}) is not finite", t,
-                                           at + sizeof(float) * (3 + k)));
+        refuse_mesh_file(path,
+                         fmt::format("damaged: a coordinate of triangle {} (at byte {}) is not finite", t, at + sizeof(float) * (3 + k)));
     }
     add_facet(file, corners, 0);
   }

@@ -34,8 +34,7 @@ class Stretcher {
         settings_(settings),
         patch_(std::max(1, int(std::lround(settings.patch_fraction * membranes.vertices())))),
         ends_(end_vertices(membranes.surfaces(), membranes.vertices(), patch_)),
-        search_(membranes.views(), membranes.elasticity(),
-                typical_edge(membranes.diagnostics()[0].area_um2, membranes.views().triangles),
+        search_(membranes.views(), membranes.elasticity(), typical_edge(membranes.diagnostics()[0].area_um2, membranes.views().triangles),
                 [&] { return membranes_.largest_stiffness_nN_per_um(); }) {}
 
   int patch() const { return patch_; }
@@ -93,8 +92,7 @@ void check_settings(const Membranes& membranes, const StretchingSettings& s) {
   if (!(s.force_pN > 0)) refuse(fmt::format("force_pN = {}: must be positive", s.force_pN));
   if (s.steps < 1) refuse(fmt::format("steps = {}: must be at least 1", s.steps));
   if (!(s.patch_fraction > 0 && s.patch_fraction <= 0.25)) {
-    refuse(fmt::format("patch_fraction = {}: must be above 0 and at most 0.25; the experiment's beads touch 0.02",
-                       s.patch_fraction));
+    refuse(fmt::format("patch_fraction = {}: must be above 0 and at most 0.25; the experiment's beads touch 0.02", s.patch_fraction));
   }
   if (!(s.tolerance > 0 && s.tolerance < 1)) {
     refuse(fmt::format("tolerance = {}: must be between 0 and 1", s.tolerance));

@@ -21,9 +21,7 @@ constexpr double least_cell_um = 1, most_cell_um = 100, usual_cell_um = 8;
 
 std::string text(const Triple& a) { return fmt::format("({:.4g}, {:.4g}, {:.4g})", a[0], a[1], a[2]); }
 
-[[noreturn]] void refuse(const std::string& path, const std::string& what) {
-  throw InputError(fmt::format("surface {}: {}", path, what));
-}
+[[noreturn]] void refuse(const std::string& path, const std::string& what) { throw InputError(fmt::format("surface {}: {}", path, what)); }
 
 /// @throws InputError  for a file with more than one surface, naming the solids or the triangles of the first two
 void check_one_piece(const std::string& path, const MeshFile& file) {
@@ -101,8 +99,8 @@ void check_cell_size(const CellSettings& cell, const FileSurface& s) {
   const std::string key = constant_key(cell, "scale");
   refuse(cell.mesh, fmt::format("its largest extent is {:.3g} um{}, and a cell's is between {} and {} um; set {} = {:g}{} "
                                 "to make it {:.3g} um",
-                                largest, cell.scale == 1 ? "" : fmt::format(" with {} = {:g}", key, cell.scale),
-                                least_cell_um, most_cell_um, key, scale, unit_of_scale(scale), factor * largest));
+                                largest, cell.scale == 1 ? "" : fmt::format(" with {} = {:g}", key, cell.scale), least_cell_um,
+                                most_cell_um, key, scale, unit_of_scale(scale), factor * largest));
 }
 
 }  // namespace
@@ -142,23 +140,25 @@ FileSurface read_cell_surface(const CellSettings& cell) {
   if (cell.recenter) {
     move_to_origin(s);
     if (off_centre(s))
-      s.notes.push_back(fmt::format("the centre of its volume, {} um in the file, goes to center_um ({} = false: the "
-                                    "file's origin does)",
-                                    text(s.centroid_um), constant_key(cell, "recenter")));
+      s.notes.push_back(
+          fmt::format("the centre of its volume, {} um in the file, goes to center_um ({} = false: the "
+                      "file's origin does)",
+                      text(s.centroid_um), constant_key(cell, "recenter")));
   } else if (off_centre(s)) {
-    s.warnings.push_back(fmt::format("center_um is where the file's origin goes, and the centre of its volume lies {} um from it",
-                                     text(s.centroid_um)));
+    s.warnings.push_back(
+        fmt::format("center_um is where the file's origin goes, and the centre of its volume lies {} um from it", text(s.centroid_um)));
   }
   if (!s.disc) {
     s.notes.emplace_back("it is not flat in one direction: the file's z is taken as the axis of the cell");
   } else if (angle > upright && cell.align) {
     s.mesh = turn_to_z(s.mesh, s.axis, {});
-    s.warnings.push_back(fmt::format("it is a disc whose axis {} is {:.0f} degrees from the file's z: turned about the origin so "
-                                     "that cells.axis is the axis of the disc ({} = false: of the file's z)",
-                                     text(s.axis), angle, constant_key(cell, "align")));
+    s.warnings.push_back(
+        fmt::format("it is a disc whose axis {} is {:.0f} degrees from the file's z: turned about the origin so "
+                    "that cells.axis is the axis of the disc ({} = false: of the file's z)",
+                    text(s.axis), angle, constant_key(cell, "align")));
   } else if (angle > upright) {
-    s.warnings.push_back(fmt::format("cells.axis is where the file's z goes, and the axis of the disc, {}, is {:.0f} degrees from it",
-                                     text(s.axis), angle));
+    s.warnings.push_back(
+        fmt::format("cells.axis is where the file's z goes, and the axis of the disc, {}, is {:.0f} degrees from it", text(s.axis), angle));
   }
   return s;
 }
@@ -168,9 +168,10 @@ FileSurface read_body_surface(const BodySettings& body) {
   if (body.recenter)
     move_to_origin(s);
   else if (off_centre(s))
-    s.notes.push_back(fmt::format("the centre of its volume lies {} um from the file's origin, which goes to center_um and which it "
-                                  "turns about (bodies.recenter = true: the centre of its volume)",
-                                  text(s.centroid_um)));
+    s.notes.push_back(
+        fmt::format("the centre of its volume lies {} um from the file's origin, which goes to center_um and which it "
+                    "turns about (bodies.recenter = true: the centre of its volume)",
+                    text(s.centroid_um)));
   return s;
 }
 

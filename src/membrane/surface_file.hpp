@@ -6,13 +6,13 @@
 namespace corpuscle {
 
 struct FileSurface {
-  TriangleMesh mesh;        // ready to be placed: its origin goes to center_um, its z to `axis`
-  Triple extent_um{};       // along the file's axes, scaled
+  TriangleMesh mesh;   // ready to be placed: its origin goes to center_um, its z to `axis`
+  Triple extent_um{};  // along the file's axes, scaled
   double area_um2 = 0, volume_um3 = 0;
-  Triple centroid_um{};     // of the enclosed volume, from the file's origin, scaled
-  bool disc = false;        // flat in one direction, and so with an axis of its own
-  Triple axis{0, 0, 1};     // of the disc, in the file
-  double diameter_um = 0, thickness_um = 0;   // of the disc: mean extent across the axis, extent along it
+  Triple centroid_um{};                      // of the enclosed volume, from the file's origin, scaled
+  bool disc = false;                         // flat in one direction, and so with an axis of its own
+  Triple axis{0, 0, 1};                      // of the disc, in the file
+  double diameter_um = 0, thickness_um = 0;  // of the disc: mean extent across the axis, extent along it
   std::vector<std::string> notes, warnings;  // what was put right; what was changed that may not have been meant
 };
 

@@ -101,8 +101,7 @@ RevolvedShape::Meridian BiconcaveShape::meridian(const Latitude& latitude) const
   const double q = 0.25 * s * s, dq = 0.5 * s * c, ddq = 0.5 * (c * c - s * s);
   const double f = a0 + q * (a1 + q * a2), df = a1 + 2 * a2 * q;
   const double f1 = df * dq, f2 = 2 * a2 * dq * dq + df * ddq;  // derivatives of f to phi
-  return {0.5 * D0 * s,           D0 * c * f,    0.5 * D0 * c,
-          D0 * (-s * f + c * f1), -0.5 * D0 * s, D0 * (-c * f - 2 * s * f1 + c * f2)};
+  return {0.5 * D0 * s, D0 * c * f, 0.5 * D0 * c, D0 * (-s * f + c * f1), -0.5 * D0 * s, D0 * (-c * f - 2 * s * f1 + c * f2)};
 }
 
 EllipsoidShape::EllipsoidShape(const Triple& semi_axes) : axes_{semi_axes[0], semi_axes[1], semi_axes[2]} {

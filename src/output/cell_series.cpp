@@ -17,8 +17,7 @@ const std::string name = "cell_series", shared = "numbers", places = "centroid_u
 
 }  // namespace
 
-CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine,
-                       std::optional<double> restart_us)
+CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine, std::optional<double> restart_us)
     : comm_(comm),
       cells_(cells),
       series_(folder, name, format_name, comm, shared, {"number"},
@@ -29,9 +28,8 @@ CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cell
       stored_times(path, format_name);
       const auto found = Hdf5File::read(path).shape("number");
       if (found != Shape{cells_})
-        throw InputError(fmt::format(
-            "{}: cannot continue this file, it has {} cells and this case {}; choose another folder with --out", path,
-            found.at(0), cells_));
+        throw InputError(fmt::format("{}: cannot continue this file, it has {} cells and this case {}; choose another folder with --out",
+                                     path, found.at(0), cells_));
     });
     series_.resume(*restart_us);
     return;
@@ -49,8 +47,7 @@ CellSeries::CellSeries(const std::string& folder, const Comm& comm, hsize_t cell
 void CellSeries::write(double time_us, long step, const Rows& mine, const std::vector<CellTable>& tables) {
   auto file = Hdf5File::create(series_.step_path(step), comm_);
   for (const auto& table : tables)
-    file.write(table.name,
-               table.components == 1 ? Shape{cells_} : Shape{cells_, static_cast<hsize_t>(table.components)}, mine,
+    file.write(table.name, table.components == 1 ? Shape{cells_} : Shape{cells_, static_cast<hsize_t>(table.components)}, mine,
                table.values);
   file.attribute("/", "time_us", time_us);
   file.attribute("/", "step", static_cast<std::int64_t>(step));

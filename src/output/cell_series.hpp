@@ -12,8 +12,7 @@ class CellSeries {
  public:
   /// Every rank calls. @param mine  rows of this rank's cells; @param restart_us  as CellWriter
   /// @throws InputError  on every rank, if the files cannot be written or the one to continue has other cells
-  CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine,
-             std::optional<double> restart_us);
+  CellSeries(const std::string& folder, const Comm& comm, hsize_t cells, const Rows& mine, std::optional<double> restart_us);
 
   /// Store one time; one of the tables is "centroid_um". Every rank calls. A step that is there already is replaced.
   /// @throws ComputationError  on every rank, for example on a full disk

@@ -86,8 +86,7 @@ void CellWriter::write(double time_us, long step, const double* x, const std::ve
     auto file = Hdf5File::create(series_.step_path(step));
     file.write("x_um", {vertices_, 3}, x);
     for (const auto& field : fields)
-      file.write(field.name,
-                 field.components == 1 ? Shape{vertices_} : Shape{vertices_, static_cast<hsize_t>(field.components)},
+      file.write(field.name, field.components == 1 ? Shape{vertices_} : Shape{vertices_, static_cast<hsize_t>(field.components)},
                  field.values);
     file.attribute("/", "time_us", time_us);
     file.attribute("/", "step", static_cast<std::int64_t>(step));
@@ -96,16 +95,15 @@ void CellWriter::write(double time_us, long step, const double* x, const std::ve
   series_.finish(step, time_us);
 }
 
-void CellWriter::write(double time_us, long step, const SurfaceShare& mine, const double* x,
-                       const std::vector<VertexField>& fields, const std::vector<CellTable>& tables) {
+void CellWriter::write(double time_us, long step, const SurfaceShare& mine, const double* x, const std::vector<VertexField>& fields,
+                       const std::vector<CellTable>& tables) {
   auto file = Hdf5File::create(series_.step_path(step), comm_);
   const auto shape = [](hsize_t rows, int components) {
     return components == 1 ? Shape{rows} : Shape{rows, static_cast<hsize_t>(components)};
   };
   file.write("x_um", {vertices_, 3}, mine.vertex_rows, x);
   for (const auto& field : fields) file.write(field.name, shape(vertices_, field.components), mine.vertex_rows, field.values);
-  for (const auto& table : tables)
-    file.write("per_cell/" + table.name, shape(mine.cells, table.components), mine.cell_rows, table.values);
+  for (const auto& table : tables) file.write("per_cell/" + table.name, shape(mine.cells, table.components), mine.cell_rows, table.values);
   file.attribute("/", "time_us", time_us);
   file.attribute("/", "step", static_cast<std::int64_t>(step));
   file.close();
@@ -114,11 +112,10 @@ void CellWriter::write(double time_us, long step, const SurfaceShare& mine, cons
 
 std::string CellWriter::describe(const StoredTime& time, const Hdf5File& file) const {
   const std::string mesh = name_ + "/mesh.h5", own = name_ + "/" + time.group + ".h5";
-  auto text =
-      fmt::format("    <Topology TopologyType=\"Triangle\" NumberOfElements=\"{}\">\n     {}\n    </Topology>\n",
-                  triangles_, xdmf_item(mesh, "triangles", {triangles_, 3}, "Int", 4));
-  text += fmt::format("    <Geometry GeometryType=\"XYZ\">\n     {}\n    </Geometry>\n",
-                      xdmf_item(own, "x_um", {vertices_, 3}, "Float", 8));
+  auto text = fmt::format("    <Topology TopologyType=\"Triangle\" NumberOfElements=\"{}\">\n     {}\n    </Topology>\n", triangles_,
+                          xdmf_item(mesh, "triangles", {triangles_, 3}, "Int", 4));
+  text +=
+      fmt::format("    <Geometry GeometryType=\"XYZ\">\n     {}\n    </Geometry>\n", xdmf_item(own, "x_um", {vertices_, 3}, "Float", 8));
   for (const auto& name : file.entries("/")) {
     if (name == "x_um" || name == "per_cell") continue;
     const auto shape = file.shape(name);

@@ -1,5 +1,5 @@
-// cells.h5 and cells.xdmf: the surfaces of all cells and bodies at stored times, as ParaView opens them; of the bodies beside cells that are
-// shared out bodies.h5 and bodies.xdmf.
+// cells.h5 and cells.xdmf: the surfaces of all cells and bodies at stored times, as ParaView opens them; of the bodies beside cells that
+// are shared out bodies.h5 and bodies.xdmf.
 #pragma once
 
 #ifdef CORPUSCLE_HDF5
@@ -53,8 +53,7 @@ class CellWriter {
  private:
   void begin(const std::string& folder, std::optional<double> restart_us, const std::function<void()>& create);
   void create(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies);
-  void create_shared(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies,
-                     const SurfaceShare& mine);
+  void create_shared(const std::vector<std::int32_t>& triangles, const std::vector<std::int32_t>& bodies, const SurfaceShare& mine);
   void require_same_surfaces(const std::string& path) const;
   std::string describe(const StoredTime& time, const Hdf5File& file) const;
 

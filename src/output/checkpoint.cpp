@@ -21,9 +21,7 @@ namespace {
 const std::string format_name = "Corpuscle checkpoint";
 constexpr hsize_t piece = hsize_t{1} << 22;  // entries that a rank reads at once to check them
 
-std::uint32_t sum_over_ranks(const Comm& comm, std::uint32_t part) {
-  return static_cast<std::uint32_t>(comm.sum(static_cast<long>(part)));
-}
+std::uint32_t sum_over_ranks(const Comm& comm, std::uint32_t part) { return static_cast<std::uint32_t>(comm.sum(static_cast<long>(part))); }
 
 /// Checksum of rows [first, first + count) of a stored array.
 template <class T>
@@ -83,8 +81,7 @@ std::string seal_of(const CheckpointHeader& header, const Fingerprint& texts, co
 std::string seal_of(const Hdf5File& file) {
   Fingerprint texts, arrays;
   for (const auto& name : lines_of(file.read_text("texts"))) seal_text(texts, name, file.read_text(name));
-  for (const auto& name : lines_of(file.read_text("arrays")))
-    seal_array(arrays, name, file.shape(name), file.integer(name, "checksum"));
+  for (const auto& name : lines_of(file.read_text("arrays"))) seal_array(arrays, name, file.shape(name), file.integer(name, "checksum"));
   return seal_of(header_of(file), texts, arrays);
 }
 
@@ -94,14 +91,16 @@ void require_checkpoint(const Hdf5File& file) {
     throw InputError(fmt::format("{}: this HDF5 file is not a checkpoint of Corpuscle", path));
   const auto version = file.integer("/", "version");
   if (version != CheckpointHeader::format_version)
-    throw InputError(fmt::format("{}: this checkpoint has format version {}, and this program reads version {}: it was written by "
-                                 "another version of the program, with which it can be gone on from; or run the case anew",
-                                 path, version, CheckpointHeader::format_version));
-  if (!file.has_attribute("/", "complete"))
-    throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
+    throw InputError(
+        fmt::format("{}: this checkpoint has format version {}, and this program reads version {}: it was written by "
+                    "another version of the program, with which it can be gone on from; or run the case anew",
+                    path, version, CheckpointHeader::format_version));
+  if (!file.has_attribute("/", "complete")) throw InputError(fmt::format("{}: this checkpoint was not finished; use an older one", path));
   if (!file.has_attribute("/", "seal") || file.text("/", "seal") != seal_of(file))
-    throw InputError(fmt::format("{}: its header (time, step, case and the like) is damaged: it is not what was written; use "
-                                 "another checkpoint", path));
+    throw InputError(
+        fmt::format("{}: its header (time, step, case and the like) is damaged: it is not what was written; use "
+                    "another checkpoint",
+                    path));
 }
 
 }  // namespace
@@ -121,8 +120,7 @@ CheckpointWriter::CheckpointWriter(std::string path, const Comm& comm, const Che
   file_->attribute("/", "git", header_.git);
   file_->attribute("/", "step", static_cast<std::int64_t>(header.step));
   file_->attribute("/", "time_us", header.time_us);
-  for (int d = 0; d < 3; ++d)
-    file_->attribute("/", cells_attribute(d), static_cast<std::int64_t>(header.cells[d]));
+  for (int d = 0; d < 3; ++d) file_->attribute("/", cells_attribute(d), static_cast<std::int64_t>(header.cells[d]));
   add_text("case", header.resolved);
   add_text("files", header.files);
   add_text("run", header.run);
@@ -169,12 +167,8 @@ void CheckpointWriter::list_array(const std::string& name, const Shape& shape, s
   arrays_ += name + "\n";
 }
 
-void CheckpointWriter::add(const std::string& name, const Shape& shape, const double* values) {
-  add_whole(name, shape, values);
-}
-void CheckpointWriter::add(const std::string& name, const Shape& shape, const std::int64_t* values) {
-  add_whole(name, shape, values);
-}
+void CheckpointWriter::add(const std::string& name, const Shape& shape, const double* values) { add_whole(name, shape, values); }
+void CheckpointWriter::add(const std::string& name, const Shape& shape, const std::int64_t* values) { add_whole(name, shape, values); }
 void CheckpointWriter::add(const std::string& name, const Shape& shape, const Slab& mine, const double* values) {
   add_part(name, shape, mine, values);
 }
@@ -205,8 +199,7 @@ void CheckpointWriter::commit() {
     reach_disk(temporary_);
     std::error_code error;
     std::filesystem::rename(temporary_, path_, error);
-    if (error)
-      throw ComputationError(fmt::format("{}: cannot put the checkpoint in place: {}", path_, error.message()));
+    if (error) throw ComputationError(fmt::format("{}: cannot put the checkpoint in place: {}", path_, error.message()));
   });
   file_.reset();
 }
@@ -249,18 +242,17 @@ void CheckpointReader::require_grid(const std::array<int, 3>& cells) const {
   if (cells == header_.cells) return;
   // Case files count nodes, one more than cells.
   const auto nodes = [](std::array<int, 3> n) { return fmt::format("[{}, {}, {}]", n[0] + 1, n[1] + 1, n[2] + 1); };
-  throw InputError(fmt::format("{}: this checkpoint has a grid of {} nodes, and the case has grid.nodes = {}",
-                               file_.path(), nodes(header_.cells), nodes(cells)));
+  throw InputError(fmt::format("{}: this checkpoint has a grid of {} nodes, and the case has grid.nodes = {}", file_.path(),
+                               nodes(header_.cells), nodes(cells)));
 }
 
 void CheckpointReader::require_shape(const std::string& name, const Shape& shape) const {
   if (!file_.has(name))
-    throw InputError(fmt::format("{}: this checkpoint has no '{}', which the case needs: it is from another scene",
-                                 file_.path(), name));
+    throw InputError(fmt::format("{}: this checkpoint has no '{}', which the case needs: it is from another scene", file_.path(), name));
   const auto found = file_.shape(name);
   if (found != shape)
-    throw InputError(fmt::format("{}: '{}' has {} entries in this checkpoint, and the case needs {}", file_.path(),
-                                 name, fmt::join(found, " x "), fmt::join(shape, " x ")));
+    throw InputError(fmt::format("{}: '{}' has {} entries in this checkpoint, and the case needs {}", file_.path(), name,
+                                 fmt::join(found, " x "), fmt::join(shape, " x ")));
 }
 
 void CheckpointReader::read(const std::string& name, const Shape& shape, double* values) const {

@@ -65,8 +65,7 @@ void FieldWriter::require_same_grid(const std::string& path) const {
                     path, fmt::join(found, " x "), fmt::join(expected, " x ")));
 }
 
-void FieldWriter::write(double time_us, long step, const std::vector<CellField>& fields,
-                        const std::vector<CellLabels>& labels) {
+void FieldWriter::write(double time_us, long step, const std::vector<CellField>& fields, const std::vector<CellLabels>& labels) {
   const Slab mine{reversed(index_.first, 0), reversed(index_.n, 0)};
   auto file = Hdf5File::create(series_.step_path(step), comm_);
   for (const auto& field : fields) {

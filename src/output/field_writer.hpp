@@ -33,8 +33,7 @@ class FieldWriter {
 
   /// Store one time. A step that is there already is replaced.
   /// @throws ComputationError  on every rank, for example on a full disk
-  void write(double time_us, long step, const std::vector<CellField>& fields,
-             const std::vector<CellLabels>& labels = {});
+  void write(double time_us, long step, const std::vector<CellField>& fields, const std::vector<CellLabels>& labels = {});
 
  private:
   void create(const double* nodes);

@@ -129,8 +129,7 @@ void Hdf5File::close() {
 std::string Hdf5File::write_failure(const std::string& what) const {
   const auto why = reason();
   const bool full = why.find("No space left") != std::string::npos || why.find("quota") != std::string::npos;
-  return fmt::format("{}: writing {} failed: {}; {}choose another folder with --out", path_, what, why,
-                     full ? "free some space or " : "");
+  return fmt::format("{}: writing {} failed: {}; {}choose another folder with --out", path_, what, why, full ? "free some space or " : "");
 }
 
 /// One rank's failure is all ranks'.
@@ -142,8 +141,7 @@ void Hdf5File::settle(const std::string& failure) {
 }
 
 void Hdf5File::fail_read(const std::string& what) const {
-  throw InputError(fmt::format("{}: cannot read {}: {}; the file is damaged or was not written by this program", path_,
-                               what, reason()));
+  throw InputError(fmt::format("{}: cannot read {}: {}; the file is damaged or was not written by this program", path_, what, reason()));
 }
 
 void Hdf5File::require_space(const std::string& name, double bytes) const {
@@ -152,10 +150,10 @@ void Hdf5File::require_space(const std::string& name, double bytes) const {
     std::error_code unknown;
     const double free = static_cast<double>(std::filesystem::space(path_, unknown).available) / mb;
     if (!unknown && free < bytes / mb + margin)
-      throw ComputationError(fmt::format(
-          "{}: the disk is full: {} needs {:.4g} MB and {:.4g} MB are free; what was written before is complete. "
-          "Free some space or choose another folder with --out",
-          path_, name, bytes / mb + margin, free));
+      throw ComputationError(
+          fmt::format("{}: the disk is full: {} needs {:.4g} MB and {:.4g} MB are free; what was written before is complete. "
+                      "Free some space or choose another folder with --out",
+                      path_, name, bytes / mb + margin, free));
   };
   if (comm_)
     on_root(*comm_, check);
@@ -179,8 +177,7 @@ void Hdf5File::write_slab(const std::string& name, const Shape& shape, const Sla
   const Shape& in_memory = memory.empty() ? count : memory;
   const Handle source(H5Screate_simple(static_cast<int>(in_memory.size()), in_memory.data(), nullptr), H5Sclose);
   if (mine || !comm_ || comm_->root()) {
-    H5Sselect_hyperslab(space, H5S_SELECT_SET, mine ? mine->offset.data() : origin.data(), nullptr, count.data(),
-                        nullptr);
+    H5Sselect_hyperslab(space, H5S_SELECT_SET, mine ? mine->offset.data() : origin.data(), nullptr, count.data(), nullptr);
     H5Sselect_hyperslab(source, H5S_SELECT_SET, origin.data(), nullptr, count.data(), nullptr);
     if (failure.empty() && (H5Sselect_valid(space) <= 0 || H5Sselect_valid(source) <= 0))
       failure = fmt::format("{}: writing {} failed: this rank's part lies outside the array", path_, name);
@@ -258,8 +255,7 @@ void Hdf5File::write(const std::string& name, const Shape& shape, const std::int
 void Hdf5File::write(const std::string& name, const Shape& shape, const std::int64_t* data) {
   write_slab(name, shape, nullptr, H5T_NATIVE_INT64, data, {});
 }
-void Hdf5File::write(const std::string& name, const Shape& shape, const Slab& mine, const double* data,
-                     const Shape& memory) {
+void Hdf5File::write(const std::string& name, const Shape& shape, const Slab& mine, const double* data, const Shape& memory) {
   write_slab(name, shape, &mine, H5T_NATIVE_DOUBLE, data, memory);
 }
 void Hdf5File::write(const std::string& name, const Shape& shape, const Slab& mine, const std::int8_t* data) {
@@ -288,9 +284,8 @@ std::string Hdf5File::read_text(const std::string& name) const {
 
 void Hdf5File::write_attribute(const std::string& object, const std::string& name, hid_t type, const void* value) {
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(
-      H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-      H5Aclose);
+  const Handle attribute(H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose);
   const bool bad = attribute.bad() || H5Awrite(attribute, type, value) < 0;
   settle(bad ? write_failure("attribute " + name) : "");
 }
@@ -372,18 +367,10 @@ void Hdf5File::read_slab(const std::string& name, const Slab* part, hid_t type, 
 }
 
 void Hdf5File::read(const std::string& name, double* data) const { read_slab(name, nullptr, H5T_NATIVE_DOUBLE, data); }
-void Hdf5File::read(const std::string& name, std::int32_t* data) const {
-  read_slab(name, nullptr, H5T_NATIVE_INT32, data);
-}
-void Hdf5File::read(const std::string& name, std::int64_t* data) const {
-  read_slab(name, nullptr, H5T_NATIVE_INT64, data);
-}
-void Hdf5File::read(const std::string& name, const Slab& part, double* data) const {
-  read_slab(name, &part, H5T_NATIVE_DOUBLE, data);
-}
-void Hdf5File::read(const std::string& name, const Slab& part, std::int64_t* data) const {
-  read_slab(name, &part, H5T_NATIVE_INT64, data);
-}
+void Hdf5File::read(const std::string& name, std::int32_t* data) const { read_slab(name, nullptr, H5T_NATIVE_INT32, data); }
+void Hdf5File::read(const std::string& name, std::int64_t* data) const { read_slab(name, nullptr, H5T_NATIVE_INT64, data); }
+void Hdf5File::read(const std::string& name, const Slab& part, double* data) const { read_slab(name, &part, H5T_NATIVE_DOUBLE, data); }
+void Hdf5File::read(const std::string& name, const Slab& part, std::int64_t* data) const { read_slab(name, &part, H5T_NATIVE_INT64, data); }
 
 void Hdf5File::read_attribute(const std::string& object, const std::string& name, hid_t type, void* value) const {
   const Handle attribute(H5Aopen_by_name(file_, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);

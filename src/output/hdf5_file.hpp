@@ -66,8 +66,7 @@ class Hdf5File {
   void write(const std::string& name, const Shape& shape, const std::int32_t* data);
   void write(const std::string& name, const Shape& shape, const std::int64_t* data);
   /// This rank's part of a data set, from memory of shape `memory` (at its origin; empty: the slab's own shape).
-  void write(const std::string& name, const Shape& shape, const Slab& mine, const double* data,
-             const Shape& memory = {});
+  void write(const std::string& name, const Shape& shape, const Slab& mine, const double* data, const Shape& memory = {});
   void write(const std::string& name, const Shape& shape, const Slab& mine, const std::int8_t* data);
   void write(const std::string& name, const Shape& shape, const Slab& mine, const std::int64_t* data);
 
@@ -109,11 +108,9 @@ class Hdf5File {
   Hdf5File(std::string path, hid_t file, const Comm* comm);
   static Hdf5File open(const std::string& path, unsigned how);
   void require_space(const std::string& name, double bytes) const;
-  void write_slab(const std::string& name, const Shape& shape, const Slab* mine, hid_t type, const void* data,
-                  const Shape& memory);
+  void write_slab(const std::string& name, const Shape& shape, const Slab* mine, hid_t type, const void* data, const Shape& memory);
   void write_rows(const std::string& name, const Shape& shape, const Rows& mine, hid_t type, const void* data);
-  void write_selected(const std::string& name, hid_t set, hid_t type, hid_t source, hid_t space, const void* data,
-                      std::string failure);
+  void write_selected(const std::string& name, hid_t set, hid_t type, hid_t source, hid_t space, const void* data, std::string failure);
   void read_slab(const std::string& name, const Slab* part, hid_t type, void* data) const;
   void write_attribute(const std::string& object, const std::string& name, hid_t type, const void* value);
   void read_attribute(const std::string& object, const std::string& name, hid_t type, void* value) const;

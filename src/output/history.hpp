@@ -33,8 +33,7 @@ class HistoryWriter {
   /// Rank 0 writes; all ranks call.
   /// @param restart_us  samples of an existing history.csv up to this time are kept and continued; absent: a new file
   /// @throws InputError  the file cannot be written, or the one to continue has other columns
-  HistoryWriter(const std::string& folder, const Comm& comm, const HistoryColumns& columns,
-                std::optional<double> restart_us = {});
+  HistoryWriter(const std::string& folder, const Comm& comm, const HistoryColumns& columns, std::optional<double> restart_us = {});
 
   /// Append one line and flush it. All ranks call; only rank 0's sample counts.
   /// @throws ComputationError  the disk is full

@@ -37,18 +37,16 @@ std::vector<double> interleaved(const IndexSpace& index, const CellBox& box, con
 
 std::vector<std::int64_t> box_integers(const IndexSpace& index, const CellBox& box, const Array<NodeKind>& kind) {
   const Buffer<std::int64_t> buffer(uninitialised("corpuscle::output::buffer"), box.size());
-  for_box_positions("corpuscle::output::gather_kinds", index, box,
-                    KOKKOS_LAMBDA(int e, int c) { buffer(e) = static_cast<std::int64_t>(kind(c)); });
+  for_box_positions(
+      "corpuscle::output::gather_kinds", index, box, KOKKOS_LAMBDA(int e, int c) { buffer(e) = static_cast<std::int64_t>(kind(c)); });
   return to_vector(buffer);
 }
 
-void set_box_values(const IndexSpace& index, const CellBox& box, const std::vector<double>& values,
-                    const Array<double>& field) {
+void set_box_values(const IndexSpace& index, const CellBox& box, const std::vector<double>& values, const Array<double>& field) {
   scatter_box(index, box, to_buffer(values), field);
 }
 
-void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vector<double>& values,
-                     const Components<double>& field) {
+void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vector<double>& values, const Components<double>& field) {
   scatter_vectors(index, box, to_buffer(values), field);
 }
 

@@ -14,10 +14,8 @@ std::vector<double> box_values(const IndexSpace& index, const CellBox& box, cons
 std::vector<double> interleaved(const IndexSpace& index, const CellBox& box, const Components<double>& field);
 std::vector<std::int64_t> box_integers(const IndexSpace& index, const CellBox& box, const Array<NodeKind>& kind);
 
-void set_box_values(const IndexSpace& index, const CellBox& box, const std::vector<double>& values,
-                    const Array<double>& field);
-void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vector<double>& values,
-                     const Components<double>& field);
+void set_box_values(const IndexSpace& index, const CellBox& box, const std::vector<double>& values, const Array<double>& field);
+void set_interleaved(const IndexSpace& index, const CellBox& box, const std::vector<double>& values, const Components<double>& field);
 
 /// [vertex, 3] values of the first `count` vertices.
 std::vector<double> vertex_values(int count, const Components<double>& field);

@@ -82,8 +82,7 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
                         {"coupling", to_json(report.coupling_iterations)},
                         {"membrane_substeps", to_json(report.membrane_substeps)}};
   json["errors"] = report.errors;
-  for (const char* name :
-       {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
+  for (const char* name : {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"})
     if (!json["errors"].contains(name)) json["errors"][name] = nullptr;
   json["warnings"] = report.warnings;
   if (const WarningsTold* told = warnings_told()) {
@@ -93,8 +92,7 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["quantities"] = report.quantities;
   if (!report.error_bars.empty()) json["error_bars"] = report.error_bars;
   const auto path = (std::filesystem::path(folder) / "report.json").string();
-  on_root(comm,
-          [&] { replace_text_file(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"); });
+  on_root(comm, [&] { replace_text_file(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n"); });
 }
 
 }  // namespace corpuscle

@@ -26,11 +26,11 @@ struct Tally {
 
 struct Report {
   std::string case_path, title;
-  std::string stopped;     // by which signal, or because of what; empty: it ran to its end
-  std::string broke_down;  // the message; empty: it did not
-  int ranks = 0;  // 0: those that write the report
-  std::string resolved;                       // every key with the value used, as TOML
-  std::vector<std::string> active, left_out;  // modules
+  std::string stopped;                                      // by which signal, or because of what; empty: it ran to its end
+  std::string broke_down;                                   // the message; empty: it did not
+  int ranks = 0;                                            // 0: those that write the report
+  std::string resolved;                                     // every key with the value used, as TOML
+  std::vector<std::string> active, left_out;                // modules
   nlohmann::json left_out_cost = nlohmann::json::object();  // by module, where known: kernels_per_step, memory_mb
   long steps = 0;
   double simulated_us = 0;
@@ -48,7 +48,8 @@ struct Report {
   nlohmann::json extra = nlohmann::json::object();
 };
 
-/// Write `folder`/report.json, with all that has been warned of so far as `told`. All ranks call: wall_s_by_part is the largest over the ranks, memory is summed.
+/// Write `folder`/report.json, with all that has been warned of so far as `told`. All ranks call: wall_s_by_part is the largest over the
+/// ranks, memory is summed.
 /// @throws InputError, ComputationError  on every rank, if the file cannot be written
 void write_report(const std::string& folder, const Comm& comm, const Report& report);
 

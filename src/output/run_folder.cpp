@@ -25,10 +25,9 @@ namespace {
 
 constexpr const char* lock_name = ".corpuscle.lock";
 constexpr const char* run_name = ".corpuscle.run";
-const std::vector<std::string> result_files = {"report.json", "case.toml", "history.csv", "fields.h5",    "fields.xdmf",
-                                               "cells.h5",    "cells.xdmf",  "checkpoint.h5", "blood.csv",
-                                               "blood.h5",    "cell_series.h5", "cell_series.xdmf",
-                                               "bodies.h5",   "bodies.xdmf"};
+const std::vector<std::string> result_files = {"report.json",    "case.toml",        "history.csv",   "fields.h5",  "fields.xdmf",
+                                               "cells.h5",       "cells.xdmf",       "checkpoint.h5", "blood.csv",  "blood.h5",
+                                               "cell_series.h5", "cell_series.xdmf", "bodies.h5",     "bodies.xdmf"};
 
 std::string first_result(const fs::path& folder) {
   for (const auto& name : result_files)
@@ -48,9 +47,7 @@ struct RunLabel {
   explicit RunLabel(const fs::path& folder) { std::ifstream(folder / run_name) >> run >> from >> step; }
 };
 
-std::string label_text(const std::string& run, const Continued& from) {
-  return fmt::format("{}\n{} {}\n", run, from.run, from.step);
-}
+std::string label_text(const std::string& run, const Continued& from) { return fmt::format("{}\n{} {}\n", run, from.run, from.step); }
 
 std::string this_host() {
   char name[256] = "";
@@ -73,8 +70,7 @@ void remove_results(const std::string& folder) {
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(inner)) {
       const auto name = entry.path().filename().string();
-      if (name.rfind("step_", 0) == 0 || name.rfind("grid.h5", 0) == 0 || name.rfind("mesh.h5", 0) == 0 ||
-          name.rfind("numbers.h5", 0) == 0)
+      if (name.rfind("step_", 0) == 0 || name.rfind("grid.h5", 0) == 0 || name.rfind("mesh.h5", 0) == 0 || name.rfind("numbers.h5", 0) == 0)
         files.push_back(entry.path());
     }
     for (const auto& file : files) fs::remove(file, ignored);
@@ -120,9 +116,10 @@ void RunFolder::claim(const std::string& named, const std::string& case_name, co
     lock();
     const auto result = first_result(path_);
     if (!result.empty() && earlier_ == EarlierResults::refuse)
-      throw InputError(fmt::format("--out {}: holds the results of an earlier run ({}): choose another folder, write over them with "
-                                   "--overwrite, or go on from them with --restart {}/checkpoint.h5",
-                                   path_, result, path_));
+      throw InputError(
+          fmt::format("--out {}: holds the results of an earlier run ({}): choose another folder, write over them with "
+                      "--overwrite, or go on from them with --restart {}/checkpoint.h5",
+                      path_, result, path_));
     run_ = new_run();
     label_ = run_ + "\n";
     if (continued) settle_run(*continued);
@@ -140,15 +137,18 @@ void RunFolder::settle_run(const Continued& continued) {
   const auto result = first_result(path_);
   const bool here = fs::equivalent(path_, fs::absolute(continued.checkpoint, ignored).parent_path(), ignored);
   if (earlier_ == EarlierResults::overwrite && here)
-    throw InputError(fmt::format("--overwrite would remove {} before the run goes on from it: leave out --overwrite, or choose "
-                                 "another folder with --out", continued.checkpoint));
+    throw InputError(
+        fmt::format("--overwrite would remove {} before the run goes on from it: leave out --overwrite, or choose "
+                    "another folder with --out",
+                    continued.checkpoint));
   if (result.empty() || earlier_ == EarlierResults::overwrite) return;
   const RunLabel label(path_);
   const bool began_here = label.from == continued.run && label.step == continued.step;
   if (label.run.empty() ? !here : label.run != continued.run && !began_here)
-    throw InputError(fmt::format("--out {}: holds the results of another run ({}) than {} is of: choose another folder, go on "
-                                 "from its own {}/checkpoint.h5, or write over them with --overwrite",
-                                 path_, result, continued.checkpoint, path_));
+    throw InputError(
+        fmt::format("--out {}: holds the results of another run ({}) than {} is of: choose another folder, go on "
+                    "from its own {}/checkpoint.h5, or write over them with --overwrite",
+                    path_, result, continued.checkpoint, path_));
   run_ = label.run.empty() ? continued.run : label.run;
   label_ = label.run.empty() ? label_text(run_, continued) : "";
 }
@@ -157,8 +157,7 @@ void RunFolder::make(const std::string& path) {
   std::error_code ignored;
   fs::path folder = fs::path(path).lexically_normal();
   if (folder.filename().empty() && folder.has_parent_path() && folder != folder.root_path()) folder = folder.parent_path();
-  for (fs::path above = folder; !above.empty() && !fs::exists(above, ignored); above = above.parent_path())
-    first_made_ = above.string();
+  for (fs::path above = folder; !above.empty() && !fs::exists(above, ignored); above = above.parent_path()) first_made_ = above.string();
   prepare_folder(path);
   path_ = folder.string();
 }
@@ -203,7 +202,8 @@ void RunFolder::refuse_shared(const std::string& path, int why) {
 /// The system gives the lock back when the process ends, however it ends.
 void RunFolder::lock() {
   const auto path = (fs::path(path_) / lock_name).string();
-  struct stat opened {}, named {};
+  struct stat opened {
+  }, named{};
   do {  // another run may have removed the file, with the folder, between these two calls
     if (lock_ >= 0) ::close(lock_);
     lock_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);

@@ -41,8 +41,7 @@ std::string step_group(long step) { return fmt::format("step_{:09d}", step); }
 std::vector<StoredTime> stored_times(const std::string& path, const std::string& format) {
   const auto file = Hdf5File::read(path);
   if (!file.has_attribute("/", "format") || file.text("/", "format") != format)
-    throw InputError(
-        fmt::format("{}: cannot continue this file, it is not {}; choose another folder with --out", path, format));
+    throw InputError(fmt::format("{}: cannot continue this file, it is not {}; choose another folder with --out", path, format));
   std::vector<StoredTime> times;
   for (const auto& name : file.entries("/"))
     if (is_step(name) && file.has_attribute(name, "time_us")) times.push_back({name, file.number(name, "time_us")});
@@ -144,8 +143,7 @@ void Series::write_index() {
 void Series::append_index() {
   const auto add = [&] {
     auto index = Hdf5File::append(index_.spare());
-    for (std::size_t n = indexed_; n < times_.size(); ++n)
-      index.link(times_[n].group, name_ + "/" + times_[n].group + ".h5", "/");
+    for (std::size_t n = indexed_; n < times_.size(); ++n) index.link(times_[n].group, name_ + "/" + times_[n].group + ".h5", "/");
     index.close();
   };
   const auto copy = [&] {
@@ -164,8 +162,8 @@ void Series::append_index() {
 }
 
 std::string Series::grid_text(const StoredTime& time) const {
-  return fmt::format("   <Grid Name=\"{}\" GridType=\"Uniform\">\n    <Time Value=\"{}\"/>\n{}   </Grid>\n", name_,
-                     time.time_us, describe_(time, Hdf5File::read(path(time.group))));
+  return fmt::format("   <Grid Name=\"{}\" GridType=\"Uniform\">\n    <Time Value=\"{}\"/>\n{}   </Grid>\n", name_, time.time_us,
+                     describe_(time, Hdf5File::read(path(time.group))));
 }
 
 void Series::rewrite_xdmf() {
@@ -193,7 +191,7 @@ void Series::append_xdmf() {
   const auto& path = xdmf_.spare();
   std::FILE* file = std::fopen(path.c_str(), "r+");
   const bool written = file && std::fseek(file, static_cast<long>(xdmf_length_), SEEK_SET) == 0 &&
-                 std::fwrite(whole.data(), 1, whole.size(), file) == whole.size() && std::fflush(file) == 0;
+                       std::fwrite(whole.data(), 1, whole.size(), file) == whole.size() && std::fflush(file) == 0;
   const int why = errno;
   if (file) std::fclose(file);
   if (!written) throw ComputationError(fmt::format("{}: writing failed: {}", path, std::strerror(why)));
@@ -202,15 +200,14 @@ void Series::append_xdmf() {
   xdmf_text_ = text;
 }
 
-std::string xdmf_item(const std::string& file, const std::string& data_set, const Shape& shape, const char* number,
-                      int bytes) {
+std::string xdmf_item(const std::string& file, const std::string& data_set, const Shape& shape, const char* number, int bytes) {
   return fmt::format("<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"{}\" Format=\"HDF\">{}:/{}</DataItem>",
                      fmt::join(shape, " "), number, bytes, file, data_set);
 }
 
 std::string xdmf_attribute(const std::string& name, int components, const char* center, const std::string& item) {
-  return fmt::format("    <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"{}\">\n     {}\n    </Attribute>\n",
-                     name, components == 3 ? "Vector" : "Scalar", center, item);
+  return fmt::format("    <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"{}\">\n     {}\n    </Attribute>\n", name,
+                     components == 3 ? "Vector" : "Scalar", center, item);
 }
 
 }  // namespace corpuscle

@@ -38,8 +38,8 @@ class Series {
   /// @param name    "fields": of the folder and of both files beside it
   /// @param format  what <name>.h5 says it is
   /// @param shared  arrays that all times share, of <name>/<shared_file>.h5
-  Series(const std::string& folder, const std::string& name, const std::string& format, const Comm& comm,
-         const std::string& shared_file, const std::vector<std::string>& shared, Describe describe);
+  Series(const std::string& folder, const std::string& name, const std::string& format, const Comm& comm, const std::string& shared_file,
+         const std::vector<std::string>& shared, Describe describe);
 
   /// Forget what is there and start anew; the folder is created.
   /// @throws InputError  on every rank
@@ -82,8 +82,7 @@ class Series {
 };
 
 /// A <DataItem> that refers to a data set. `number` is "Float", "Int" or "Char".
-std::string xdmf_item(const std::string& file, const std::string& data_set, const Shape& shape, const char* number,
-                      int bytes);
+std::string xdmf_item(const std::string& file, const std::string& data_set, const Shape& shape, const char* number, int bytes);
 
 /// An <Attribute> on top of it; components 1 or 3; center "Cell" or "Node".
 std::string xdmf_attribute(const std::string& name, int components, const char* center, const std::string& item);

@@ -67,8 +67,8 @@ void prepare_folder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder))
-    throw InputError(fmt::format("--out {}: cannot create this folder: {}", folder,
-                                 error ? error.message() : "something else has its name"));
+    throw InputError(
+        fmt::format("--out {}: cannot create this folder: {}", folder, error ? error.message() : "something else has its name"));
   const auto probe = fs::path(folder) / ".corpuscle_write_test";
   auto* file = std::fopen(probe.c_str(), "w");
   if (!file) throw InputError(fmt::format("--out {}: cannot write in this folder: {}", folder, std::strerror(errno)));

@@ -38,8 +38,7 @@ Gathering::Gathering(const Comm& comm, const IndexSpace& part, const IndexSpace&
     if (direction >= 0 && block.first[direction] + block.n[direction] == whole.n[direction]) ++block.n[direction];
     for (int k = 0; k < block.n[2]; ++k)
       for (int j = 0; j < block.n[1]; ++j)
-        for (int i = 0; i < block.n[0]; ++i)
-          cells.push_back(whole.cell(block.first[0] + i, block.first[1] + j, block.first[2] + k));
+        for (int i = 0; i < block.n[0]; ++i) cells.push_back(whole.cell(block.first[0] + i, block.first[1] + j, block.first[2] + k));
     end_.push_back(static_cast<int>(cells.size()));
   }
   cell_ = Array<int>(uninitialised("corpuscle::gathering::cell"), cells.size());

@@ -48,8 +48,7 @@ constexpr bool whole_planes_pass = Kokkos::SpaceAccessibility<Kokkos::HostSpace,
 #ifdef CORPUSCLE_MPI
 /// Along the last direction layers are whole planes, each component's in one piece, which pass from field to field in one message.
 template <class Field>
-void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neighbour)[2], const Field& field, int components,
-                     int layers) {
+void exchange_planes(const Comm& comm, const IndexSpace& index, const int (&neighbour)[2], const Field& field, int components, int layers) {
   using Value = typename Field::non_const_value_type;
   const int h = IndexSpace::halo, n = index.n[2], plane = index.stride(2), size = layers * plane;
   const int bytes = size * static_cast<int>(sizeof(Value)), first = index.cell(-h, -h, 0);
@@ -88,21 +87,19 @@ std::array<int, 3> ranks_per_direction(int ranks, const std::array<int, 3>& glob
       const std::array<int, 3> blocks{a, b, ranks / a / b};
       if (!cut_is_possible(blocks, global)) continue;
       double cut = 0;
-      for (int d = 0; d < 3; ++d)
-        cut += (blocks[d] - 1.0) * global[(d + 1) % 3] * global[(d + 2) % 3];
+      for (int d = 0; d < 3; ++d) cut += (blocks[d] - 1.0) * global[(d + 1) % 3] * global[(d + 2) % 3];
       if (cut < least) least = cut, best = blocks;
     }
   }
   if (best[0] == 0)
-    throw InputError(fmt::format(
-        "the grid of {} x {} x {} cells cannot be cut into {} blocks of at least {} cells a side: use fewer ranks or "
-        "a finer grid (grid.nodes)",
-        global[0], global[1], global[2], ranks, IndexSpace::halo));
+    throw InputError(
+        fmt::format("the grid of {} x {} x {} cells cannot be cut into {} blocks of at least {} cells a side: use fewer ranks or "
+                    "a finer grid (grid.nodes)",
+                    global[0], global[1], global[2], ranks, IndexSpace::halo));
   return best;
 }
 
-IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic,
-                     std::array<int, 3>* ranks) {
+IndexSpace decompose(const Comm& comm, const std::array<int, 3>& global, const std::array<bool, 3>& periodic, std::array<int, 3>* ranks) {
   const std::array<int, 3> best = ranks_per_direction(comm.size(), global);
   const auto at = coordinates(comm.rank(), best);
   IndexSpace index;
@@ -188,20 +185,19 @@ void Halo::run(const Field& field, int layers, bool own_too) {
     for (int side = 0; side < 2; ++side) {
       if (neighbour_[d][side] < 0) continue;
       const int count = slab(index_, d, side, true, layers).size() * components;
-      MPI_Irecv(receive_host_[side].data(), count * static_cast<int>(sizeof(Value)), MPI_BYTE, neighbour_[d][side],
-                1 - side, comm_.handle(), &request[pending++]);
+      MPI_Irecv(receive_host_[side].data(), count * static_cast<int>(sizeof(Value)), MPI_BYTE, neighbour_[d][side], 1 - side,
+                comm_.handle(), &request[pending++]);
     }
     for (int side = 0; side < 2; ++side) {
       if (neighbour_[d][side] < 0) continue;
       const CellBox box = slab(index_, d, side, false, layers);
-      Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(send_[side].data()),
-                                                                    box.size() * components);
+      Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(send_[side].data()), box.size() * components);
       pack_box(index_, box, field, buffer);
       if (send_host_[side].data() != send_[side].data()) Kokkos::deep_copy(send_host_[side], send_[side]);
       Exec().fence();
       traffic().sent(static_cast<long>(box.size()) * components * sizeof(Value));
-      MPI_Isend(send_host_[side].data(), box.size() * components * static_cast<int>(sizeof(Value)), MPI_BYTE,
-                neighbour_[d][side], side, comm_.handle(), &request[pending++]);
+      MPI_Isend(send_host_[side].data(), box.size() * components * static_cast<int>(sizeof(Value)), MPI_BYTE, neighbour_[d][side], side,
+                comm_.handle(), &request[pending++]);
     }
     MPI_Waitall(pending, request, MPI_STATUSES_IGNORE);
     for (int side = 0; side < 2; ++side) {
@@ -209,7 +205,7 @@ void Halo::run(const Field& field, int layers, bool own_too) {
       const CellBox box = slab(index_, d, side, true, layers);
       if (receive_[side].data() != receive_host_[side].data()) Kokkos::deep_copy(receive_[side], receive_host_[side]);
       Kokkos::View<Value*, Memory, Kokkos::MemoryUnmanaged> buffer(reinterpret_cast<Value*>(receive_[side].data()),
-                                                                    box.size() * components);
+                                                                   box.size() * components);
       unpack_box(index_, box, buffer, field);
     }
 #endif

@@ -133,7 +133,8 @@ void PackingShape::tabulate(const TriangleMesh& mesh) {
 }
 
 bool PackingShape::interpolate(const int (&cell)[3], const double (&at)[3], double& value, Vec3& gradient) const {
-  const std::size_t first = node(cell[0], cell[1], cell[2]), up[2] = {static_cast<std::size_t>(n_[0]), static_cast<std::size_t>(n_[0]) * n_[1]};
+  const std::size_t first = node(cell[0], cell[1], cell[2]),
+                    up[2] = {static_cast<std::size_t>(n_[0]), static_cast<std::size_t>(n_[0]) * n_[1]};
   double v[2][2][2];
   for (int c = 0; c < 2; ++c)
     for (int b = 0; b < 2; ++b)

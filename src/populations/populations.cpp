@@ -79,9 +79,10 @@ class Packer {
       share += wanted_[p] * cell_volume(p) / volume_;
       balls += wanted_[p] * 4.0 / 3 * std::acos(-1.0) * std::pow(shapes_[types_[p]].radius(), 3) / volume_;
     }
-    if (share > most_share) throw InputError(fmt::format("{}: {} alone would be {:.2f} of the fluid's volume, more than fit in any way: ask for less",
-                                                     amount(scene_.populations[0], 0),
-                                                     types_.size() > 1 ? "the cells of all populations" : "its cells", share));
+    if (share > most_share)
+      throw InputError(fmt::format("{}: {} alone would be {:.2f} of the fluid's volume, more than fit in any way: ask for less",
+                                   amount(scene_.populations[0], 0), types_.size() > 1 ? "the cells of all populations" : "its cells",
+                                   share));
     constexpr double loose = 0.15;  // of the volume, of balls around them: chance finds places for these at once
     // Rounded, since the volume's last bits depend on the ranks that sum it up.
     scale_ = std::min(1.0, 1e-3 * std::floor(1e3 * std::cbrt(loose / balls)));
@@ -181,11 +182,11 @@ class Packer {
     if (text.empty()) text = amount(scene_.populations[0], 0) + ": its cells do not fit";
     if (types_.size() > 1) text += fmt::format("; all together hematocrit {:.3f} of {:.3f}", reached, asked);
     throw InputError(text + fmt::format("; {}. Ask for less, for a smaller gap_um, or for a "
-                            "wider {}; another seed may place a few more or less",
-                            may_deform() ? "also as membranes they would have to be much smaller"
-                            : scene_.contact ? "beside [[cells]] they keep the shape that they have at rest"
-                                             : "they keep the shape that they have at rest: with [contact] they would bend",
-                            in_boxes() ? "box (lower_um, upper_um of the populations) or grid" : "grid"));
+                                        "wider {}; another seed may place a few more or less",
+                                        may_deform()     ? "also as membranes they would have to be much smaller"
+                                        : scene_.contact ? "beside [[cells]] they keep the shape that they have at rest"
+                                                         : "they keep the shape that they have at rest: with [contact] they would bend",
+                                        in_boxes() ? "box (lower_um, upper_um of the populations) or grid" : "grid"));
   }
 
   /// Where not one cell has room, fewer of them are no remedy.
@@ -193,16 +194,19 @@ class Packer {
     const PopulationSettings& population = scene_.populations[0];
     const double wide = 2 * shapes_[types_[0]].radius();
     const double room = (may_deform() ? least_size() : 1.0) * wide + 2 * population.gap_um;
-    throw InputError(fmt::format("{}: not even one of its cells fits: they are {:.3g} um wide at rest, and {} need about {:.2g} um across: use "
-                                 "a wider {}grid{}, a smaller gap_um, or smaller cells (cell_types.{}){}",
-                                 amount(population, 0), wide,
-                                 may_deform() ? fmt::format("as membranes, which grow from {:g} of their size,", least_size()) : "in that shape",
-                                 room, in_boxes() ? "box (lower_um, upper_um of the populations) or " : "", scene_.grid->diameter_um > 0 ? fmt::format(" (grid.diameter_um, now {:g})", scene_.grid->diameter_um) : "",
-                                 population.type, may_deform() ? "" : ", or add [contact], with which they bend"));
+    throw InputError(
+        fmt::format("{}: not even one of its cells fits: they are {:.3g} um wide at rest, and {} need about {:.2g} um across: use "
+                    "a wider {}grid{}, a smaller gap_um, or smaller cells (cell_types.{}){}",
+                    amount(population, 0), wide,
+                    may_deform() ? fmt::format("as membranes, which grow from {:g} of their size,", least_size()) : "in that shape", room,
+                    in_boxes() ? "box (lower_um, upper_um of the populations) or " : "",
+                    scene_.grid->diameter_um > 0 ? fmt::format(" (grid.diameter_um, now {:g})", scene_.grid->diameter_um) : "",
+                    population.type, may_deform() ? "" : ", or add [contact], with which they bend"));
   }
 
   bool in_boxes() const {
-    return std::any_of(scene_.populations.begin(), scene_.populations.end(), [](const PopulationSettings& p) { return p.lower_um || p.upper_um; });
+    return std::any_of(scene_.populations.begin(), scene_.populations.end(),
+                       [](const PopulationSettings& p) { return p.lower_um || p.upper_um; });
   }
 
   static constexpr double most_share = 0.75;

@@ -23,8 +23,8 @@ struct PackedCells {
 struct PackedShare {
   std::vector<CellPlace> cells;  // of all, those from `first` on
   std::int64_t first = 0, total = 0;
-  std::vector<int> count;        // [population]
-  double size = 1;               // as PackedCells
+  std::vector<int> count;  // [population]
+  double size = 1;         // as PackedCells
 };
 PackedShare share_of(const CellPlaces& places, const Comm& comm);
 /// Without gaps.

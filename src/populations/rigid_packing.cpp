@@ -37,7 +37,9 @@ struct Instances {
         if (inside) bins[bin(at)].push_back({static_cast<int>(b), static_cast<int>(s)});
       }
   }
-  std::size_t bin(const int (&at)[3]) const { return at[0] + static_cast<std::size_t>(n[0]) * (at[1] + static_cast<std::size_t>(n[1]) * at[2]); }
+  std::size_t bin(const int (&at)[3]) const {
+    return at[0] + static_cast<std::size_t>(n[0]) * (at[1] + static_cast<std::size_t>(n[1]) * at[2]);
+  }
   template <class Use>
   void visit(const Vec3& p, const Use& use) const {
     int low[3], high[3], at[3];
@@ -71,8 +73,7 @@ Rotation Rotation::turned(const Vec3& by) const {
   return {share * q.w, share * q.x, share * q.y, share * q.z};
 }
 
-RigidPacking::RigidPacking(const std::vector<PackingShape>& shapes, std::vector<PackedBody> bodies, const PackingSpace& space,
-                           double scale)
+RigidPacking::RigidPacking(const std::vector<PackingShape>& shapes, std::vector<PackedBody> bodies, const PackingSpace& space, double scale)
     : shapes_(shapes), bodies_(std::move(bodies)), space_(space), scale_(scale) {
   for (const PackedBody& b : bodies_) largest_gap_ = std::max(largest_gap_, b.gap + PackingSpace::spare);
   rest();

@@ -24,16 +24,18 @@ struct Rotation {
 struct PackedBody {
   int shape = 0;
   bool movable = true, turns = true;
-  int group = 0;     // of limits
-  double gap = 0;    // um, least to any other surface
-  Vec3 center;       // um
+  int group = 0;   // of limits
+  double gap = 0;  // um, least to any other surface
+  Vec3 center;     // um
   Rotation rotation;
 };
 
 /// Boxes that bodies stay within, um.
 struct PackingLimits {
   Vec3 lower{-1e300, -1e300, -1e300}, upper{1e300, 1e300, 1e300};
-  bool any() const { return lower.x > -1e299 || lower.y > -1e299 || lower.z > -1e299 || upper.x < 1e299 || upper.y < 1e299 || upper.z < 1e299; }
+  bool any() const {
+    return lower.x > -1e299 || lower.y > -1e299 || lower.z > -1e299 || upper.x < 1e299 || upper.y < 1e299 || upper.z < 1e299;
+  }
 };
 
 /// What all bodies have to do with.
@@ -88,12 +90,12 @@ class RigidPacking {
   double scale_, largest_gap_ = 0, skin_ = 0;
   bool fine_ = false;
   std::vector<Near> near_;
-  std::vector<Vec3> listed_;          // [body] centres when lists were made
+  std::vector<Vec3> listed_;  // [body] centres when lists were made
   double listed_scale_ = 0;
   std::vector<Vec3> velocity_, spin_, force_, torque_;
   std::vector<double> stiffness_, overlap_;  // [body]
-  std::vector<double> seen_;          // [3 * point, point] places in another's frame, and how far beyond its box
-  std::vector<Vec3> rows_;            // [body * 3] of the rotations' matrices
+  std::vector<double> seen_;                 // [3 * point, point] places in another's frame, and how far beyond its box
+  std::vector<Vec3> rows_;                   // [body * 3] of the rotations' matrices
   double step_ = 0.1, mixing_ = 0.1;
   int downhill_ = 0;
   long iterations_ = 0;

@@ -52,7 +52,7 @@ double find_bounds(const Lattice& lattice, MarkerSearch& search) {
   };
   search.lower = {1e300, 1e300, 1e300};
   search.upper = {-1e300, -1e300, -1e300};
-  for_nodes([&](const int (&at)[3], const Vec3& p) {
+  for_nodes([&](const int(&at)[3], const Vec3& p) {
     take_in(p);
     for (int d = 0; d < 3; ++d) {
       if (at[d] == lattice.upper[d]) continue;
@@ -62,7 +62,7 @@ double find_bounds(const Lattice& lattice, MarkerSearch& search) {
     }
   });
   search.bins = make_node_bins(lattice, search.lower, search.upper, sum / static_cast<double>(links), link);
-  for_nodes([&](const int (&at)[3], const Vec3& p) {
+  for_nodes([&](const int(&at)[3], const Vec3& p) {
     for (int d = 0; d < 3; ++d)
       if ((lattice.boundary_below[d] && at[d] == lattice.lower[d]) || (lattice.boundary_above[d] && at[d] == lattice.upper[d]))
         take_in(p + link * outward_of(lattice, x, at, d));
@@ -193,7 +193,8 @@ void Transfer::for_planes(const Use& use) {
   for (int begin = 0; begin < planes; begin += at_once)
     most = std::max<std::size_t>(most, above(std::min(begin + at_once, planes)) - below(begin));
   const std::size_t dipoles = ratios_.empty() ? 0 : 3;
-  double* const memory = workspace_->reserve((6 * points + 3 + dipoles) * most + (6 * most * sizeof(short) + sizeof(double) - 1) / sizeof(double));
+  double* const memory =
+      workspace_->reserve((6 * points + 3 + dipoles) * most + (6 * most * sizeof(short) + sizeof(double) - 1) / sizeof(double));
   markers_.weight = Table<double>(memory, most, 6 * points);
   markers_.across = Table<double>(memory + 6 * points * most, most, 3);
   markers_.dipole = Table<double>(memory + (6 * points + 3) * most, dipoles > 0 ? most : 0, dipoles);

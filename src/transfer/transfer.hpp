@@ -47,8 +47,7 @@ class Transfer {
   /// Velocity of the vertices [vertex, 3], um/us, from fluxes through faces and velocities on the sides of the block: this
   /// rank's part.
   /// @param slip  null for none
-  void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip,
-                   const Components<double>& velocity);
+  void interpolate(const Array<double> (&flux)[3], const Components<double>& u, const SlipViews* slip, const Components<double>& velocity);
   /// Power that forces [vertex, 3] give to sides that move: the part of a kernel that is folded back pushes the side itself. This
   /// rank's part, nW. Finds all weights anew: for reports. @param slip  as for spread()
   double power_on_sides(const Components<double>& force, const Components<double>& u, const SlipViews* slip = nullptr);
@@ -99,7 +98,7 @@ class Transfer {
   MarkerViews markers_;
   std::shared_ptr<Workspace> workspace_;
   int room_ = 0;
-  bool marked_ = false;   // cells near markers are, and the planes' first markers known
+  bool marked_ = false;  // cells near markers are, and the planes' first markers known
   Array<int> first_of_plane_;
   HostCopy<Array<int>> first_of_plane_host_;
   double largest_spacing_ = 0;

@@ -17,11 +17,7 @@ fs::path write_case(const fs::path& folder, const std::string& name, bool sheare
   if (!sheared) out << "pressure_gradient_Pa_per_um = [-6, 0, -2]\n";
   for (const char* side : {"i_min", "i_max", "j_min", "j_max", "k_min", "k_max"}) {
     const bool wall = side[0] == 'j', moves = wall && sheared;
-    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \""
-        << (moves  ? "moving_wall"
-            : wall ? "wall"
-                   : "periodic")
-        << "\"\n";
+    out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"" << (moves ? "moving_wall" : wall ? "wall" : "periodic") << "\"\n";
     if (moves) out << "velocity_mm_per_s = [" << (side[2] == 'm' && side[3] == 'i' ? -4 : 4) << ", 0, 0]\n";
   }
   out << "[[cell_types]]\nname = \"large\"\nshape = \"sphere\"\nradius_um = 0.75\nvertices = 60\nlaw = "
@@ -29,8 +25,8 @@ fs::path write_case(const fs::path& folder, const std::string& name, bool sheare
          "[[cell_types]]\nname = \"small\"\nshape = \"sphere\"\nradius_um = 0.65\nvertices = 50\nlaw = "
          "\"neo-hookean\"\n";
   for (int n = 0; n < cells; ++n)
-    out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6)
-        << ", " << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
+    out << "[[cells]]\ntype = \"" << (n % 3 == 0 ? "large" : "small") << "\"\ncenter_um = [" << 1 + 2.0 * (n % 6) << ", "
+        << 1 + 2.0 * (n / 6 % 2) << ", " << 1.5 + 3.0 * (n / 12) << "]\n";
   out << "[coupling]\nscheme = \"force\"\n[contact]\nrange_um = 0.1\n[blood]\nfrom_us = 20\nsample_every_us = 10\n"
          "[output]\nfields = [\"wall_shear_stress\"]\nevery_us = 80\ncheckpoint_every_us = 40\nhistory_every_us = 20\n";
   return folder / (name + ".toml");
@@ -49,8 +45,7 @@ double largest_difference(const fs::path& a, const fs::path& b) {
     REQUIRE(x.size() == y.size());
     for (std::size_t n = 0; n < x.size(); ++n) {
       REQUIRE(x[n].empty() == y[n].empty());
-      if (!x[n].empty())
-        most = std::max(most, std::abs(std::stod(x[n]) - std::stod(y[n])) / (1e-12 + std::abs(std::stod(x[n]))));
+      if (!x[n].empty()) most = std::max(most, std::abs(std::stod(x[n]) - std::stod(y[n])) / (1e-12 + std::abs(std::stod(x[n]))));
     }
   }
   CHECK_FALSE(std::getline(second, two));
@@ -69,8 +64,7 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   CHECK(blood["samples"] == 7);  // at 20, 30, ... 80 us
   CHECK(blood["crossings"] == 0);
   const double share = blood["tube_hematocrit"];
-  CHECK(share == Approx((6 * std::pow(0.75, 3) + 12 * std::pow(0.65, 3)) * 4 * M_PI / 3 / (12 * 4 * 6))
-                     .epsilon(0.12));  // coarse meshes
+  CHECK(share == Approx((6 * std::pow(0.75, 3) + 12 * std::pow(0.65, 3)) * 4 * M_PI / 3 / (12 * 4 * 6)).epsilon(0.12));  // coarse meshes
   const double speed = blood["mean_speed_mm_per_s"], cells = blood["cell_speed_mm_per_s"];
   CHECK(cells / speed == Approx(1.5 * 0.75).epsilon(0.1));  // of a parabola, half way from the middle to the wall
   CHECK(blood["discharge_hematocrit"].get<double>() == Approx(share * cells / speed).epsilon(1e-12));
@@ -113,15 +107,13 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
         data_set(folder / "one/cells.h5", "step_000000008/per_cell/centroid_um"));
   const auto listed = contents(folder / "one/cell_series.xdmf");
   CHECK_THAT(listed, Catch::Contains("CollectionType=\"Temporal\"") && Catch::Contains("Polyvertex") &&
-                         Catch::Contains("NodesPerElement=\"1\">\n     <DataItem Dimensions=\"18\"") &&
-                         Catch::Contains("deformation"));
+                         Catch::Contains("NodesPerElement=\"1\">\n     <DataItem Dimensions=\"18\"") && Catch::Contains("deformation"));
 #ifdef CORPUSCLE_MPI
   for (int ranks : {2, 4}) {
     const std::string out = "on_" + std::to_string(ranks);
     succeed(folder, {"run", name, "--out", out}, {1, ranks});
     INFO(out);
-    CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") <
-          1e-8);  // round-off, grown over eight steps
+    CHECK(largest_difference(folder / "one/blood.csv", folder / out / "blood.csv") < 1e-8);  // round-off, grown over eight steps
     const auto on_ranks = data_set(folder / out / "cell_series.h5", "step_000000006/deformation");
     REQUIRE(on_ranks.size() == 18);
     for (int n = 0; n < 18; ++n) CHECK(on_ranks[n] == Approx(deformation[n]).margin(1e-9));
@@ -157,14 +149,14 @@ TEST_CASE("blood between walls: the report, its samples and profiles, on any ran
   fail(folder, {"run", name, "--out", "parts"}, 2, {"blood.csv"}, {1, 1, "OMP_WAIT_POLICY=passive", false});
   // Other bins cannot go on from what was sampled; sampling begins anew, and says so.
   const auto anew = succeed(
-      folder,
-      {"run", name, "--out", "anew", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"},
-      {1, 1});
+      folder, {"run", name, "--out", "anew", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set", "blood.bins=4"}, {1, 1});
   CHECK_THAT(anew.output, Catch::Contains("sampling begins anew"));
   CHECK(report(folder / "anew")["blood"]["samples"] == 2);
   // Nor those of another flow.
-  const auto faster = succeed(folder, {"run", name, "--out", "faster", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set",
-                                       "fluid.pressure_gradient_Pa_per_um=[-7, 0, -2]"}, {1, 1});
+  const auto faster = succeed(folder,
+                              {"run", name, "--out", "faster", "--restart", "checkpoint.h5", "--set", "time.end_us=100", "--set",
+                               "fluid.pressure_gradient_Pa_per_um=[-7, 0, -2]"},
+                              {1, 1});
   CHECK_THAT(faster.output, Catch::Contains("(fluid.pressure_gradient_Pa_per_um): sampling begins anew"));
   CHECK(report(folder / "faster")["blood"]["samples"] == 2);
   CHECK(report(folder / "faster")["blood"]["from_us"] == 80);
@@ -175,8 +167,9 @@ TEST_CASE("where more than blood drives or holds a flow, nothing is told of how 
   const auto folder = fresh_folder("disturbed");
   const std::string name = write_case(folder, "sheared", true, 2).string();
   const bool pushed = GENERATE(true, false);
-  std::vector<std::string> options{"run", name, "--out", "run", "--overwrite", "--set", "blood.from_us=0", "--set", "time.end_us=40",
-                                   "--set", "output.every_us=40", "--set"};
+  std::vector<std::string> options{
+      "run",  name, "--out", "run", "--overwrite", "--set", "blood.from_us=0", "--set", "time.end_us=40", "--set", "output.every_us=40",
+      "--set"};
   if (pushed) {
     options.emplace_back("cells.0.push_nN=[0.05, 0, 0]");
   } else {
@@ -192,9 +185,7 @@ TEST_CASE("where more than blood drives or holds a flow, nothing is told of how 
 TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is left out") {
   const auto folder = fresh_folder("viscometer");
   const std::string name = write_case(folder, "sheared", true, 2).string();
-  succeed(folder,
-          {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.end_us=200", "--set",
-           "output.every_us=200"},
+  succeed(folder, {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.end_us=200", "--set", "output.every_us=200"},
           {1, 1});
   const auto blood = report(folder / "run")["blood"];
   INFO(blood.dump(1));
@@ -217,14 +208,19 @@ TEST_CASE("blood in a viscometer: what has a meaning there, and why the rest is 
   CHECK(lines.number(lines.lines.size() - 1, "inclination_deg") < 50);
   CHECK(lines.number(lines.lines.size() - 1, "membrane_angle_deg") < lines.number(0, "membrane_angle_deg"));
   // Walls that come to speed slowly, in 40 times what the flow takes to follow: the same viscosity at any of their speeds.
-  std::vector<std::string> ramp{"run", name, "--out", "ramp", "--set", "blood.from_us=0", "--set", "time.end_us=200",
-                                "--set", "output.every_us=200", "--set", "boundary.2.ramp_us=400", "--set", "boundary.3.ramp_us=400"};
+  std::vector<std::string> ramp{"run",   name,
+                                "--out", "ramp",
+                                "--set", "blood.from_us=0",
+                                "--set", "time.end_us=200",
+                                "--set", "output.every_us=200",
+                                "--set", "boundary.2.ramp_us=400",
+                                "--set", "boundary.3.ramp_us=400"};
   succeed(folder, ramp, {1, 1});
   CHECK(report(folder / "ramp")["blood"]["relative_apparent_viscosity"].get<double>() == Approx(viscosity).margin(0.05));
   // Walls that swing through rest: the sample there has no rate of shear, and is left out of the mean, not the mean itself.
   succeed(folder,
-          {"run", name, "--out", "swing", "--set", "blood.from_us=0", "--set", "time.end_us=80", "--set", "output.every_us=80",
-           "--set", "boundary.2.time_table=[[0, 1], [40, 0], [80, -1]]", "--set", "boundary.3.time_table=[[0, 1], [40, 0], [80, -1]]"},
+          {"run", name, "--out", "swing", "--set", "blood.from_us=0", "--set", "time.end_us=80", "--set", "output.every_us=80", "--set",
+           "boundary.2.time_table=[[0, 1], [40, 0], [80, -1]]", "--set", "boundary.3.time_table=[[0, 1], [40, 0], [80, -1]]"},
           {1, 1});
   const auto swing = report(folder / "swing")["blood"];
   INFO(swing.dump(1));
@@ -275,8 +271,10 @@ TEST_CASE("packed cells with membrane viscosity run") {
   const auto folder = fresh_folder("viscous_population");
   const std::string name = write_case(folder, "driven", false, 1).string();
   std::ofstream(name, std::ios::app) << "[[populations]]\ntype = \"large\"\ncount = 2\n";
-  succeed(folder, {"run", name, "--out", "run", "--set", "time.end_us=20", "--set", "blood.from_us=0", "--set",
-                   "cell_types.0.membrane_viscosity_N_s_per_m=1e-8"}, {1, 1});
+  succeed(folder,
+          {"run", name, "--out", "run", "--set", "time.end_us=20", "--set", "blood.from_us=0", "--set",
+           "cell_types.0.membrane_viscosity_N_s_per_m=1e-8"},
+          {1, 1});
   CHECK(report(folder / "run")["blood"]["cells"] == 3);
 }
 
@@ -289,8 +287,10 @@ TEST_CASE("blood is sampled at fixed times, whatever the steps") {
   text.erase(key, std::string("sample_every_us = 10\n").size());
   std::ofstream(name) << text;
   // Shorter steps at first: 25 of each length. Ten whole steps between samples all the same.
-  succeed(folder, {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.step_us=4", "--set", "time.first_step_us=1",
-                   "--set", "time.end_us=160", "--set", "output.every_us=160"}, {1, 1});
+  succeed(folder,
+          {"run", name, "--out", "run", "--set", "blood.from_us=0", "--set", "time.step_us=4", "--set", "time.first_step_us=1", "--set",
+           "time.end_us=160", "--set", "output.every_us=160"},
+          {1, 1});
   std::ifstream table(folder / "run/blood.csv");
   std::string line;
   std::getline(table, line);
@@ -300,14 +300,12 @@ TEST_CASE("blood is sampled at fixed times, whatever the steps") {
 
 TEST_CASE("blood in tubes, straight and bent") {
   const auto folder = fresh_folder("blood_tubes");
-  const auto write = [&](const std::string& name, const std::string& shape, const std::string& ends,
-                         const std::string& place) {
+  const auto write = [&](const std::string& name, const std::string& shape, const std::string& ends, const std::string& place) {
     std::ofstream out(folder / name);
     out << "[time]\nstep_us = 8\nend_us = 320\n[grid]\nnodes = [17, 17, 25]\ndiameter_um = 8\n"
         << shape << "[fluid]\nconvection = false\nmomentum_tolerance = 1e-11\ndivergence_tolerance = 1e-12\n"
         << ends;
-    for (const char* side : {"i_min", "i_max", "j_min", "j_max"})
-      out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"wall\"\n";
+    for (const char* side : {"i_min", "i_max", "j_min", "j_max"}) out << "[[boundary]]\nside = \"" << side << "\"\ntype = \"wall\"\n";
     out << "[[cells]]\nshape = \"sphere\"\nradius_um = 2\nlaw = \"neo-hookean\"\nshear_modulus_uN_per_m = 15\nvertices "
            "= 200\ncenter_um = "
         << place
@@ -315,13 +313,11 @@ TEST_CASE("blood in tubes, straight and bent") {
            "false\ncells = false\n";
     return (folder / name).string();
   };
-  const auto end = [](const char* side, const std::string& what) {
-    return "[[boundary]]\nside = \"" + std::string(side) + "\"\n" + what;
-  };
-  const std::string straight = write("straight.toml", "generator = \"straight_tube\"\nlength_um = 12\n",
-                                     "pressure_gradient_Pa_per_um = [0, 0, -2]\n" +
-                                         end("k_min", "type = \"periodic\"\n") + end("k_max", "type = \"periodic\"\n"),
-                                     "[0, 0, 5.5]");
+  const auto end = [](const char* side, const std::string& what) { return "[[boundary]]\nside = \"" + std::string(side) + "\"\n" + what; };
+  const std::string straight =
+      write("straight.toml", "generator = \"straight_tube\"\nlength_um = 12\n",
+            "pressure_gradient_Pa_per_um = [0, 0, -2]\n" + end("k_min", "type = \"periodic\"\n") + end("k_max", "type = \"periodic\"\n"),
+            "[0, 0, 5.5]");
   succeed(folder, {"run", straight, "--out", "straight"}, {1, 1});
   const auto tube = report(folder / "straight")["blood"];
   INFO(tube.dump(1));
@@ -329,8 +325,7 @@ TEST_CASE("blood in tubes, straight and bent") {
   // so small that the walls do not feel it, in an endless tube.
   const double share = tube["tube_hematocrit"], viscosity = tube["relative_apparent_viscosity"];
   CHECK(share == Approx(4.0 / 3 * 8 / (16 * 12)).epsilon(0.03));
-  CHECK(tube["cell_speed_mm_per_s"].get<double>() / tube["mean_speed_mm_per_s"].get<double>() ==
-        Approx(5.0 / 3).epsilon(0.03));
+  CHECK(tube["cell_speed_mm_per_s"].get<double>() / tube["mean_speed_mm_per_s"].get<double>() == Approx(5.0 / 3).epsilon(0.03));
   CHECK(viscosity > 1.005);
   CHECK(viscosity < 1.15);
   if (tube["relative_apparent_viscosity_error"].is_number())
@@ -343,11 +338,10 @@ TEST_CASE("blood in tubes, straight and bent") {
   CHECK(largest_difference(folder / "straight/blood.csv", folder / "straight_2/blood.csv") < 1e-7);
 #endif
   // A quarter of a circle of 20 um around (20, 0, 0).
-  const std::string bent =
-      write("bent.toml", "generator = \"swept_tube\"\ncenterline = \"arc\"\narc_radius_um = 20\narc_angle_deg = 90\n",
-            end("k_min", "type = \"velocity_inlet\"\nvelocity_mm_per_s = 4\nprofile = \"parabolic\"\n") +
-                end("k_max", "type = \"outflow\"\n"),
-            "[4.7, 0, 12.9]");
+  const std::string bent = write(
+      "bent.toml", "generator = \"swept_tube\"\ncenterline = \"arc\"\narc_radius_um = 20\narc_angle_deg = 90\n",
+      end("k_min", "type = \"velocity_inlet\"\nvelocity_mm_per_s = 4\nprofile = \"parabolic\"\n") + end("k_max", "type = \"outflow\"\n"),
+      "[4.7, 0, 12.9]");
   succeed(folder, {"run", bent, "--out", "bent", "--set", "coupling.slip=false"}, {1, 1});
   const auto curve = report(folder / "bent")["blood"];
   INFO(curve.dump(1));

@@ -9,11 +9,9 @@ using Catch::Contains;
 TEST_CASE("nothing converges in too few iterations, and the message says so") {
   const auto folder = fresh_folder("iterations");
   fail(folder, coarse_tube("out", {"time.end_us=4", "coupling.scheme=iterated", "coupling.max_iterations=1"}), 3,
-       {"broke down", "at 1 us (step 1)", "coupling", "interface velocity", "coupling.max_iterations",
-        "Last good checkpoint: none yet"});
+       {"broke down", "at 1 us (step 1)", "coupling", "interface velocity", "coupling.max_iterations", "Last good checkpoint: none yet"});
   fail(folder, coarse_tube("out", {"time.end_us=4", "fluid.max_iterations=1"}), 3,
-       {"broke down", "at 1 us (step 1)", "velocity", "momentum equation", "fluid.max_iterations",
-        "Last good checkpoint: none yet"});
+       {"broke down", "at 1 us (step 1)", "velocity", "momentum equation", "fluid.max_iterations", "Last good checkpoint: none yet"});
   const auto r = report(folder / "out");
   CHECK_THAT(r["broke_down"].get<std::string>(), Contains("at 1 us (step 1)") && Contains("momentum equation"));
   CHECK(r["steps"] == 0);
@@ -52,14 +50,16 @@ TEST_CASE("a membrane that is torn: a report, the last good checkpoint is named,
 
 TEST_CASE("cells driven so fast that their places are too coarse for contact end the run, and do not look for contacts for ever") {
   const auto folder = fresh_folder("far_away");
-  fail(folder, {"run", CORPUSCLE_SOURCE_DIR "/cases/two_cells.toml", "--out", "out", "--set", "fluid.pressure_gradient_Pa_per_um=[1e9, 0, 0]", "--set", "output.fields=false"}, 3,
-       {"broke down", "contact: a surface is", "um from the origin", "contact.range_um", "time.step_us"});
+  fail(folder,
+       {"run", CORPUSCLE_SOURCE_DIR "/cases/two_cells.toml", "--out", "out", "--set", "fluid.pressure_gradient_Pa_per_um=[1e9, 0, 0]",
+        "--set", "output.fields=false"},
+       3, {"broke down", "contact: a surface is", "um from the origin", "contact.range_um", "time.step_us"});
 }
 
 TEST_CASE("a run that breaks down on a grid too coarse for its cell names the grid, one on a fine grid does not") {
   const auto run = [](const std::string& nodes) {
-    return coarse_tube("out", {"grid.nodes=" + nodes, "time.end_us=60", "boundary.0.velocity_mm_per_s=60", "boundary.0.ramp_us=1",
-                               "output.fields=false"});
+    return coarse_tube(
+        "out", {"grid.nodes=" + nodes, "time.end_us=60", "boundary.0.velocity_mm_per_s=60", "boundary.0.ramp_us=1", "output.fields=false"});
   };
   const Words cause{"computation broke down", "the area of cells.0"};
   Words coarse = cause;
@@ -81,9 +81,7 @@ TEST_CASE("cells that a load tears apart: all ranks stop, with a report and the 
 #else
   const int ranks = 1;
 #endif
-  const auto outcome = fail(folder, words, 3,
-                            {"broke down at ", "cells.", "time.step_us"},
-                            {1, ranks});
+  const auto outcome = fail(folder, words, 3, {"broke down at ", "cells.", "time.step_us"}, {1, ranks});
   CHECK(report(folder / "out")["steps"] >= 2);
 #ifdef CORPUSCLE_HDF5
   CHECK_THAT(outcome.output, Contains("Last good checkpoint: out/checkpoint.h5"));

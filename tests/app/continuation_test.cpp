@@ -65,7 +65,8 @@ TEST_CASE("a restart finds out that a surface or grid file holds something else,
     std::istringstream lines(contents(folder / "same.off"));
     std::ofstream edited(folder / "body.off");
     std::string line;
-    for (int n = 0; std::getline(lines, line); ++n) edited << (n == 2 ? std::to_string(std::stod(line)) + line.substr(line.find(' ')) : line) << "\n";
+    for (int n = 0; std::getline(lines, line); ++n)
+      edited << (n == 2 ? std::to_string(std::stod(line)) + line.substr(line.find(' ')) : line) << "\n";
     edited.close();
     fail(folder, restarted(channel("body.toml", "out", "2"), "out"), 2,
          {"bodies.0.file = ", "body.off\" with other content", "another scene"});

@@ -31,8 +31,8 @@ void require_columns(const History& found, const Words& wanted) {
 }
 
 void require_report_keys(const nlohmann::json& r) {
-  for (const char* key : {"case", "git", "backend", "ranks", "threads", "modules", "steps", "simulated_us", "wall_s",
-                          "wall_s_by_part", "peak_rss_mb", "iterations", "errors"}) {
+  for (const char* key : {"case", "git", "backend", "ranks", "threads", "modules", "steps", "simulated_us", "wall_s", "wall_s_by_part",
+                          "peak_rss_mb", "iterations", "errors"}) {
     INFO(key);
     REQUIRE(r.contains(key));
   }
@@ -45,8 +45,7 @@ void require_report_keys(const nlohmann::json& r) {
     REQUIRE(r["iterations"][key]["mean"].get<double>() >= 0);  // 0: a pressure that is already right
     REQUIRE(r["iterations"][key]["max"].get<double>() >= r["iterations"][key]["mean"].get<double>());
   }
-  for (const char* key :
-       {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"}) {
+  for (const char* key : {"max_divergence", "volume_drift", "area_drift", "slip", "flux_correction", "coupling_residual"}) {
     INFO(key);
     REQUIRE(r["errors"].contains(key));
   }
@@ -54,9 +53,7 @@ void require_report_keys(const nlohmann::json& r) {
   REQUIRE(r["peak_rss_mb"].get<double>() > 1);
 }
 
-bool lists(const nlohmann::json& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
+bool lists(const nlohmann::json& names, const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); }
 
 void require_no_nan(const History& h) {
   for (const auto& line : h.lines)
@@ -128,8 +125,7 @@ TEST_CASE("a cell in the tube: all files, small errors, a history without gaps")
   const auto r = report(folder / "out");
   require_report_keys(r);
   REQUIRE(r["steps"] == 10);
-  for (const char* solver : {"momentum", "pressure", "coupling"})
-    REQUIRE(r["iterations"][solver]["mean"].get<double>() >= 1);
+  for (const char* solver : {"momentum", "pressure", "coupling"}) REQUIRE(r["iterations"][solver]["mean"].get<double>() >= 1);
   REQUIRE(r["errors"]["volume_drift"].get<double>() < 1e-4);     // the inside is incompressible
   REQUIRE(r["errors"]["max_divergence"].get<double>() < 1e-10);  // twice fluid.divergence_tolerance
   // Error against run time: every part's seconds are there. What belongs to no part is a few per cent.
@@ -166,15 +162,15 @@ TEST_CASE("a rigid body: force and torque in the history") {
   succeed(folder, with({"run", sphere_case(folder), "--out", "out"}, {"grid.nodes=[17,17,25]", "time.end_us=3"}));
   require_report_keys(report(folder / "out"));
   const auto h = history(folder / "out");
-  require_columns(h, {"time_us", "cell", "centroid_z_um", "force_x_nN", "force_y_nN", "force_z_nN", "torque_x_nN_um",
-                      "torque_y_nN_um", "torque_z_nN_um"});
+  require_columns(h, {"time_us", "cell", "centroid_z_um", "force_x_nN", "force_y_nN", "force_z_nN", "torque_x_nN_um", "torque_y_nN_um",
+                      "torque_z_nN_um"});
   require_no_nan(h);
   REQUIRE(h.number(3, "force_z_nN") > 0);  // the flow drags it along
 }
 
 TEST_CASE("cells that touch: the report has gaps, crossings and the work of pushes, over a restart as well") {
   const auto folder = fresh_folder("touching");
-  const Words words{"run", scene("two_cells"), "--out", "out", "--set", "grid.nodes=[17,17,17]", "--set", "cell_types.0.vertices=300",
+  const Words words{"run",   scene("two_cells"), "--out", "out", "--set", "grid.nodes=[17,17,17]", "--set", "cell_types.0.vertices=300",
                     "--set", "output.every_us=0"};
   succeed(folder, with(words, {"time.end_us=200"}));
   const auto first = report(folder / "out");
@@ -250,19 +246,16 @@ TEST_CASE("every key that scripts rely on is accepted, and used") {
   };
   require_used({"run", scene("straight_tube"), "--out", "out"},
                {"time.step_us=0.5", "time.end_us=1", "grid.nodes=[17,17,25]", "fluid.density_pg_per_um3=1.025",
-                "fluid.kinematic_viscosity_um2_per_us=1.2", "fluid.convection=false", "cells.0.vertices=300",
-                "cells.0.mass_pg=7200", "cells.0.reference=uniform", "cells.0.interior=empty",
-                "cells.0.shear_modulus_uN_per_m=8.3", "coupling.scheme=iterated", "coupling.tolerance=0.01",
-                "output.every_us=0.5", "output.fields=[\"pressure\"]"},
-               {"step_us = 0.5", "end_us = 1", "nodes = [17, 17, 25]", "density_pg_per_um3 = 1.025",
-                "kinematic_viscosity_um2_per_us = 1.2", "convection = false", "vertices = 300", "mass_pg = 7200",
-                "reference = \"uniform\"", "interior = \"empty\"", "shear_modulus_uN_per_m = 8.3",
-                "scheme = \"iterated\"", "tolerance = 0.01", "every_us = 0.5", "fields = [\"pressure\"]"});
-  require_used(
-      {"run", sphere_case(folder), "--out", "out"},
-      {"grid.nodes=[17,17,25]", "time.end_us=1", "bodies.0.shape=sphere", "bodies.0.radius_um=1.75",
-       "bodies.0.center_um=[0.25,0,-5]", "bodies.0.velocity_mm_per_s=[0,0,1.5]"},
-      {"shape = \"sphere\"", "radius_um = 1.75", "center_um = [0.25, 0, -5]", "velocity_mm_per_s = [0, 0, 1.5]"});
+                "fluid.kinematic_viscosity_um2_per_us=1.2", "fluid.convection=false", "cells.0.vertices=300", "cells.0.mass_pg=7200",
+                "cells.0.reference=uniform", "cells.0.interior=empty", "cells.0.shear_modulus_uN_per_m=8.3", "coupling.scheme=iterated",
+                "coupling.tolerance=0.01", "output.every_us=0.5", "output.fields=[\"pressure\"]"},
+               {"step_us = 0.5", "end_us = 1", "nodes = [17, 17, 25]", "density_pg_per_um3 = 1.025", "kinematic_viscosity_um2_per_us = 1.2",
+                "convection = false", "vertices = 300", "mass_pg = 7200", "reference = \"uniform\"", "interior = \"empty\"",
+                "shear_modulus_uN_per_m = 8.3", "scheme = \"iterated\"", "tolerance = 0.01", "every_us = 0.5", "fields = [\"pressure\"]"});
+  require_used({"run", sphere_case(folder), "--out", "out"},
+               {"grid.nodes=[17,17,25]", "time.end_us=1", "bodies.0.shape=sphere", "bodies.0.radius_um=1.75",
+                "bodies.0.center_um=[0.25,0,-5]", "bodies.0.velocity_mm_per_s=[0,0,1.5]"},
+               {"shape = \"sphere\"", "radius_um = 1.75", "center_um = [0.25, 0, -5]", "velocity_mm_per_s = [0, 0, 1.5]"});
 }
 
 TEST_CASE("the mesh of a cell, the version, and a command line that says nothing") {
@@ -275,8 +268,8 @@ TEST_CASE("the mesh of a cell, the version, and a command line that says nothing
   REQUIRE(magic == "OFF");
   REQUIRE(vertices == 500);
   REQUIRE(triangles == 996);  // a closed surface without handles: 2 n - 4
-  REQUIRE_THAT(succeed(folder, {"--version"}).output,
-               Contains("corpuscle 0.") && Contains("git ") && Contains("Kokkos ") && Contains("hypre ") && Contains("MPI ") && Contains("HDF5 "));
+  REQUIRE_THAT(succeed(folder, {"--version"}).output, Contains("corpuscle 0.") && Contains("git ") && Contains("Kokkos ") &&
+                                                          Contains("hypre ") && Contains("MPI ") && Contains("HDF5 "));
   REQUIRE_THAT(succeed(folder, {"--help"}).output, Contains("run") && Contains("check") && Contains("mesh"));
   fail(folder, {}, 2, {"subcommand"});
   fail(folder, {"run", scene("couette"), "--bogus"}, 2, {"--bogus"});

@@ -36,8 +36,7 @@ TEST_CASE("error bars of a flow hold the finer answer") {
 TEST_CASE("error bars of a stretched cell hold the finer answer") {
   const auto folder = fresh_folder("bars_of_stretch");
   const Words steps{"stretching.steps=2"};
-  succeed(folder, with(with({"run", scene("stretch"), "--out", "coarse", "--estimate-error=vertices"}, steps),
-                       {"cells.0.vertices=600"}));
+  succeed(folder, with(with({"run", scene("stretch"), "--out", "coarse", "--estimate-error=vertices"}, steps), {"cells.0.vertices=600"}));
   succeed(folder, with(with({"run", scene("stretch"), "--out", "fine"}, steps), {"cells.0.vertices=1200"}));
   const auto fine = report(folder / "fine")["quantities"];
   for (const char* name : {"axial_um", "transverse_um"}) require_within_bar(report(folder / "coarse"), name, fine[name]);
@@ -70,10 +69,9 @@ TEST_CASE("a coarser run that fails costs the error bars, not the run") {
 
 TEST_CASE("bars of packed cells are of the step alone, say so, and hold for blood") {
   const auto folder = fresh_folder("bars_of_packed");
-  const auto outcome =
-      succeed(folder, with({"run", scene("single_file"), "--out", "out", "--estimate-error"},
-                           {"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "time.end_us=20", "time.first_step_us=0", "blood.from_us=0",
-                            "blood.sample_every_us=5", "output.fields=false", "output.cells=false"}));
+  const auto outcome = succeed(folder, with({"run", scene("single_file"), "--out", "out", "--estimate-error"},
+                                            {"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "time.end_us=20", "time.first_step_us=0",
+                                             "blood.from_us=0", "blood.sample_every_us=5", "output.fields=false", "output.cells=false"}));
   CHECK_THAT(outcome.output, Contains("no error bars from vertices") && Contains("would be packed anew") &&
                                  Contains("at the end (+- without the error from: spacing, vertices):"));
   const auto r = report(folder / "out");
@@ -84,10 +82,11 @@ TEST_CASE("bars of packed cells are of the step alone, say so, and hold for bloo
 
 TEST_CASE("where a longer step is not possible half of it gives the error bars") {
   const auto folder = fresh_folder("bars_of_half_steps");
-  const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=50", "time.end_us=100", "output.every_us=0", "output.history_every_us=50"};
+  const Words coarse{"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "time.step_us=50",
+                     "time.end_us=100",       "output.every_us=0",         "output.history_every_us=50"};
   const auto outcome = succeed(folder, with({"run", scene("two_cells"), "--out", "out", "--estimate-error=step"}, coarse));
-  CHECK_THAT(outcome.output, Contains("no longer step: time.step_us: steps of 100 us are too long") && Contains("the same with time.step_us=25") &&
-                                 Contains("+-"));
+  CHECK_THAT(outcome.output, Contains("no longer step: time.step_us: steps of 100 us are too long") &&
+                                 Contains("the same with time.step_us=25") && Contains("+-"));
   const auto r = report(folder / "out");
   REQUIRE(r["error_estimate"].size() == 1);
   const auto& other = r["error_estimate"][0];
@@ -103,8 +102,7 @@ TEST_CASE("estimates that cannot be made are refused") {
   fail(folder, {"run", scene("tube_flow"), "--estimate-error=mesh"}, 2, {"--estimate-error=mesh", "spacing, step, vertices"});
   fail(folder, {"run", scene("tube_flow"), "--estimate-error=vertices"}, 2, {"no [[cells]]", "spacing,step"});
   fail(folder, {"run", scene("stretch"), "--estimate-error=step"}, 2, {"has no time", "vertices"});
-  fail(folder, with({"run", scene("stretch"), "--estimate-error=vertices"}, {"cells.0.vertices=200"}), 2,
-       {"no mesh is coarser"});
+  fail(folder, with({"run", scene("stretch"), "--estimate-error=vertices"}, {"cells.0.vertices=200"}), 2, {"no mesh is coarser"});
   fail(folder, {"run", scene("tube_flow"), "--estimate-error", "--restart", "checkpoint.h5"}, 2, {"leave out --restart"});
 }
 

@@ -72,7 +72,8 @@ TEST_CASE("Couette's flow is compared once its wall's speed is constant") {
     auto changed = text;
     changed.insert(at, "time_table = " + table + "\n");
     std::ofstream(folder / "couette.toml") << changed;
-    succeed(folder, with({"run", "couette.toml", "--out", "out"}, {"grid.nodes=[5,9,5]", "time.step_us=10", "time.end_us=200", "output.fields=false"}));
+    succeed(folder, with({"run", "couette.toml", "--out", "out"},
+                         {"grid.nodes=[5,9,5]", "time.step_us=10", "time.end_us=200", "output.fields=false"}));
     return report(folder / "out")["errors"];
   };
   CHECK_FALSE(has(with_table("[[0, 1], [400, 3]]"), "couette_velocity"));
@@ -95,7 +96,8 @@ TEST_CASE("a stretching test is judged by what it is") {
 
   const auto folder = fresh_folder("stretching");
   const auto run = [&](const Words& overrides) {
-    auto words = with({"run", scene("stretch"), "--out", "out"}, {"cells.0.vertices=200", "stretching.tolerance=0.01", "output.cells=false"});
+    auto words =
+        with({"run", scene("stretch"), "--out", "out"}, {"cells.0.vertices=200", "stretching.tolerance=0.01", "output.cells=false"});
     succeed(folder, with(words, overrides));
     return report(folder / "out");
   };
@@ -114,7 +116,9 @@ TEST_CASE("a stretching test is judged by what it is") {
 TEST_CASE("a Robin coefficient far above its default is said") {
   const auto folder = fresh_folder("robin");
   const auto check = [&](const char* value) {
-    return succeed(folder, with({"check", scene("straight_tube")}, {"grid.nodes=[17,17,25]", std::string("coupling.robin_coefficient_pg_per_um2_per_us=") + value})).output;
+    return succeed(folder, with({"check", scene("straight_tube")},
+                                {"grid.nodes=[17,17,25]", std::string("coupling.robin_coefficient_pg_per_um2_per_us=") + value}))
+        .output;
   };
   CHECK_THAT(check("200"), Contains("warning: coupling.robin_coefficient_pg_per_um2_per_us = 200 is") && Contains("times its default"));
   CHECK_THAT(check("6"), !Contains("times its default"));
@@ -126,8 +130,9 @@ TEST_CASE("a cell in a flow that comes to rest is measured along one axis") {
   // What drift is left is none to go by, however slow the flow has become: its length was 2.9, 6.3 and 2.9 um in turn.
   const auto folder = fresh_folder("one_axis");
   succeed(folder, with({"run", scene("relax"), "--out", "out"},
-                       {"grid.nodes=[17,17,17]", "cells.0.vertices=250", "cells.0.start_stretch=[1.5,0.7,1]", "cells.0.membrane_viscosity_N_s_per_m=0",
-                        "time.step_us=50", "time.end_us=4500", "output.every_us=0", "output.history_every_us=250"}));
+                       {"grid.nodes=[17,17,17]", "cells.0.vertices=250", "cells.0.start_stretch=[1.5,0.7,1]",
+                        "cells.0.membrane_viscosity_N_s_per_m=0", "time.step_us=50", "time.end_us=4500", "output.every_us=0",
+                        "output.history_every_us=250"}));
   const auto samples = history(folder / "out");
   REQUIRE(samples.lines.size() > 15);
   for (std::size_t n = 1; n < samples.lines.size(); ++n)
@@ -140,7 +145,8 @@ TEST_CASE("a cell is at the outflow when it is, whatever the speed that shear mo
   INFO(outcome.output);
   CHECK(outcome.code == 0);
   CHECK(report(folder / "out")["errors"]["slip"] > 1e-3);  // a share of the flow's speed, not of that one
-  fail(folder, coarse_tube("out", {"time.end_us=40", "time.stop_before_outflow_um=21.2"}), 5, {"the limit is", "time.stop_before_outflow_um"});
+  fail(folder, coarse_tube("out", {"time.end_us=40", "time.stop_before_outflow_um=21.2"}), 5,
+       {"the limit is", "time.stop_before_outflow_um"});
 }
 
 TEST_CASE("figures of a flow at rest are not shares of round-off") {
@@ -154,7 +160,8 @@ TEST_CASE("figures of a flow at rest are not shares of round-off") {
 TEST_CASE("cells too near to an inlet or a symmetry side are refused at the start") {
   const auto folder = fresh_folder("near_sides");
   const auto tube = [&](const char* center) {
-    return with({"check", scene("straight_tube")}, {"grid.nodes=[17,17,25]", "grid.length_um=20", std::string("cells.0.center_um=") + center});
+    return with({"check", scene("straight_tube")},
+                {"grid.nodes=[17,17,25]", "grid.length_um=20", std::string("cells.0.center_um=") + center});
   };
   fail(folder, tube("[0,0,-8.4]"), 2, {"gap to a side", "cells.0", "an inlet (k_min)", "are needed", "center_um"});
   succeed(folder, tube("[0,0,0]"));
@@ -168,7 +175,9 @@ TEST_CASE("cells too near to an inlet or a symmetry side are refused at the star
 TEST_CASE("the time that is foreseen counts surfaces and their sub-steps") {
   const auto folder = fresh_folder("foreseen");
   const auto seconds = [&](const char* vertices) {
-    const auto said = succeed(folder, with({"check", scene("straight_tube")}, {"grid.nodes=[17,17,25]", std::string("cells.0.vertices=") + vertices})).output;
+    const auto said =
+        succeed(folder, with({"check", scene("straight_tube")}, {"grid.nodes=[17,17,25]", std::string("cells.0.vertices=") + vertices}))
+            .output;
     const auto at = said.find(" steps, about ");
     REQUIRE(at != std::string::npos);
     return std::stod(said.substr(at + 14));

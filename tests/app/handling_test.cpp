@@ -100,8 +100,8 @@ TEST_CASE("a signal that one rank gets stops all ranks") {
     CHECK(outcome.code == 4);
     const auto r = report(folder / "out");
     CHECK(r["stopped"] == (signal == SIGTERM ? "SIGTERM" : "SIGUSR1"));
-    succeed(folder, restarted(long_run("out", "time.end_us=" + std::to_string(4 + int(r["simulated_us"].get<double>()))),
-                              "out/checkpoint.h5"));
+    succeed(folder,
+            restarted(long_run("out", "time.end_us=" + std::to_string(4 + int(r["simulated_us"].get<double>()))), "out/checkpoint.h5"));
   }
 }
 #endif
@@ -131,11 +131,9 @@ TEST_CASE("a run killed at twenty moments: all that it has written opens, and it
     if (lines(folder / "parts/history.csv") > 3 * kills) break;
   }
   CHECK(killed > 5);
-  if (!fs::exists(folder / "parts/report.json"))
-    succeed(folder, restarted(long_run("parts", end), "parts/checkpoint.h5"));
+  if (!fs::exists(folder / "parts/report.json")) succeed(folder, restarted(long_run("parts", end), "parts/checkpoint.h5"));
   require_continued(folder, "whole", "parts");
-  for (const char* name : {"fields.xdmf", "cells.xdmf"})
-    CHECK(contents(folder / "whole" / name) == contents(folder / "parts" / name));
+  for (const char* name : {"fields.xdmf", "cells.xdmf"}) CHECK(contents(folder / "whole" / name) == contents(folder / "parts" / name));
   CHECK(read_all(folder / "parts/fields.h5") == 3 * kills + 1);
 }
 
@@ -199,8 +197,8 @@ TEST_CASE("a cell that reaches the outflow ends the run there, with everything w
   const auto folder = fresh_folder("outflow");
   // A flow a hundred times the case's, and the cell's front 5 um from the end.
   const auto fast = [](const std::string& out, double z, int speed = 200) {
-    return coarse_tube(out, {"cells.0.center_um=[0,0," + std::to_string(z) + "]",
-                             "boundary.0.velocity_mm_per_s=" + std::to_string(speed), "boundary.0.ramp_us=4", "time.end_us=100", "output.history_every_us=4", "time.first_step_us=0"});
+    return coarse_tube(out, {"cells.0.center_um=[0,0," + std::to_string(z) + "]", "boundary.0.velocity_mm_per_s=" + std::to_string(speed),
+                             "boundary.0.ramp_us=4", "time.end_us=100", "output.history_every_us=4", "time.first_step_us=0"});
   };
 #ifdef CORPUSCLE_MPI
   const std::vector<int> launches{1, 2};
@@ -208,7 +206,8 @@ TEST_CASE("a cell that reaches the outflow ends the run there, with everything w
   const std::vector<int> launches{1};
 #endif
   for (const int ranks : launches) {
-    const auto outcome = fail(folder, fast("out", 16), 5, {"a cell reached the outflow", "cells.0", "um from an outflow at", " us"}, {1, ranks});
+    const auto outcome =
+        fail(folder, fast("out", 16), 5, {"a cell reached the outflow", "cells.0", "um from an outflow at", " us"}, {1, ranks});
     CHECK_THAT(outcome.output, !Contains("outside the grid"));
     const auto r = report(folder / "out");
     CHECK_THAT(r["stopped"].get<std::string>(), Contains("a cell reached the outflow"));

@@ -57,8 +57,8 @@ std::string case_for_mesh(const fs::path& folder) {
 
 // The tube flow with a body from a file.
 std::string case_for_body(const fs::path& folder, const std::string& file) {
-  std::ofstream(folder / "body.toml") << contents(scene("tube_flow")) << "\n[[bodies]]\nshape = \"file\"\nfile = \""
-                                      << file << "\"\ncenter_um = [0, 0, 0]\n";
+  std::ofstream(folder / "body.toml") << contents(scene("tube_flow")) << "\n[[bodies]]\nshape = \"file\"\nfile = \"" << file
+                                      << "\"\ncenter_um = [0, 0, 0]\n";
   return (folder / "body.toml").string();
 }
 
@@ -91,12 +91,8 @@ TEST_CASE("case files that cannot be read") {
 }
 
 TEST_CASE("cells where they cannot be") {
-  SECTION("beyond the end of the grid") {
-    refuse("cells.0.center_um=[0,0,200]", {"cells.0", "outside the grid", "center_um"});
-  }
-  SECTION("through the end of the grid") {
-    refuse("cells.0.center_um=[0,0,22]", {"cells.0", "outside the grid", "center_um"});
-  }
+  SECTION("beyond the end of the grid") { refuse("cells.0.center_um=[0,0,200]", {"cells.0", "outside the grid", "center_um"}); }
+  SECTION("through the end of the grid") { refuse("cells.0.center_um=[0,0,22]", {"cells.0", "outside the grid", "center_um"}); }
   SECTION("beside the tube") { refuse("cells.0.center_um=[40,0,0]", {"cells.0", "outside the grid", "center_um"}); }
   SECTION("through the wall") { refuse("cells.0.center_um=[3,0,0]", {"cells.0", "outside the grid", "center_um"}); }
   // The resting cell's radius is 3.9 um in a tube of 5 um: this leaves 0.5 um, less than one spacing of the coarse
@@ -123,8 +119,7 @@ TEST_CASE("cells that overlap, or stand closer than the grid can resolve") {
     // Disks 2.55 um thick, grid spacing 1.9 um.
     fail(folder, two_cells("0.1"), 2, {"cells.0 and cells.1", "overlap", "center_um"}, {1, ranks});
     fail(folder, two_cells("2.0"), 2, {"surfaces cross", "cells.0 and cells.1 overlap", "center_um"}, {1, ranks});
-    fail(folder, two_cells("3.5"), 2, {"gap between bodies", "cells.0 and cells.1", "grid spacings apart", "grid.nodes"},
-         {1, ranks});
+    fail(folder, two_cells("3.5"), 2, {"gap between bodies", "cells.0 and cells.1", "grid spacings apart", "grid.nodes"}, {1, ranks});
     fail(folder, two_cells("5.5"), 2, {"cut off", "fluid nodes", "between two bodies", "grid.nodes"}, {1, ranks});
   }
   succeed(folder, two_cells("10"));
@@ -141,9 +136,7 @@ TEST_CASE("surfaces that are open are refused, those inside out turned with a wo
     all.push_back("cells.0.mesh=\"" + file + "\"");
     return with({"run", case_for_mesh(folder), "--out", "out"}, all);
   };
-  const auto body = [&](const std::string& file) {
-    return with({"run", case_for_body(folder, file), "--out", "out"}, settings);
-  };
+  const auto body = [&](const std::string& file) { return with({"run", case_for_body(folder, file), "--out", "out"}, settings); };
   succeed(folder, cell(whole));
   succeed(folder, body(whole));
   for (const auto& words : {cell(open_mesh), body(open_mesh)})
@@ -169,11 +162,12 @@ TEST_CASE("check and run say what a surface file holds") {
 
 TEST_CASE("check lists cell types with their laws and numbers, and what a sheet on a spheroid has come to") {
   const auto folder = fresh_folder("types");
-  std::ofstream(folder / "types.toml") << contents(scene("straight_tube"))
-                                       << "\n[[cell_types]]\nname = \"rbc\"\nvertices = 300\nreference = \"spheroid\"\n"
-                                          "[[cell_types]]\nname = \"capsule\"\nshape = \"sphere\"\nradius_um = 2\nlaw = \"skalak\"\n"
-                                          "skalak_c = 10\nbending_modulus_J = 0\n"
-                                          "[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, 10]\n[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, -10]\n";
+  std::ofstream(folder / "types.toml")
+      << contents(scene("straight_tube"))
+      << "\n[[cell_types]]\nname = \"rbc\"\nvertices = 300\nreference = \"spheroid\"\n"
+         "[[cell_types]]\nname = \"capsule\"\nshape = \"sphere\"\nradius_um = 2\nlaw = \"skalak\"\n"
+         "skalak_c = 10\nbending_modulus_J = 0\n"
+         "[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, 10]\n[[cells]]\ntype = \"rbc\"\ncenter_um = [0, 0, -10]\n";
   const auto said = succeed(folder, with({"check", "types.toml"}, {"grid.nodes=[17,17,25]"})).output;
   for (const char* part : {"cell type \"rbc\": 300 vertices, biconcave, 7.82 um wide; wlc-pow, shear modulus 6.32 uN/m; 2 cells",
                            "cell type \"capsule\": 500 vertices, a sphere of radius 2 um; skalak, C = 10, shear modulus 6.32 uN/m; 0 cells",
@@ -269,12 +263,8 @@ TEST_CASE("checkpoints that do not fit") {
     refuse_restart(coarse_tube("out", {"time.end_us=4.2", "time.step_us=0.6"}), "good/checkpoint.h5",
                    {"good/checkpoint.h5", "2 us", "time.step_us"});
   }
-  SECTION("at the end already") {
-    refuse_restart(coarse_tube("out", {"time.end_us=2"}), "good/checkpoint.h5", {"2 us", "time.end_us"});
-  }
-  SECTION("for a stretching test") {
-    refuse_restart({"run", scene("stretch")}, "good/checkpoint.h5", {"--restart", "stretching"});
-  }
+  SECTION("at the end already") { refuse_restart(coarse_tube("out", {"time.end_us=2"}), "good/checkpoint.h5", {"2 us", "time.end_us"}); }
+  SECTION("for a stretching test") { refuse_restart({"run", scene("stretch")}, "good/checkpoint.h5", {"--restart", "stretching"}); }
 }
 
 #else

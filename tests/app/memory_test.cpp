@@ -68,8 +68,7 @@ TEST_CASE("memory is announced within a quarter of what a run takes") {
   };
   for (const auto& s : scenes) {
     fs::remove_all(folder / "out");
-    const auto outcome = succeed(folder, with(with({"run", scene(s.name), "--out", "out"}, two_steps), s.overrides),
-                                 {.ranks = s.ranks});
+    const auto outcome = succeed(folder, with(with({"run", scene(s.name), "--out", "out"}, two_steps), s.overrides), {.ranks = s.ranks});
     const double foretold = announced(outcome.output), taken = report(folder / "out")["peak_rss_mb"];
     INFO(s.name << " " << s.overrides[0] << " on " << s.ranks << ": " << foretold << " MB announced, " << taken << " taken");
     // The libraries' own share differs between machines by some MB, allocators round up, and set-up has its moments.
@@ -119,7 +118,8 @@ TEST_CASE("what a cell takes of a run's memory stays below its bound") {
     succeed(folder, {"run", (folder / "dense.toml").string(), "--out", "out"}, {.threads = 1});
     return report(folder / "out")["peak_rss_mb"].get<double>();
   };
-  // It is 0.26 for a hundred cells, of which some pages of the grid's arrays, and of what set-up had, are in one run alone: up to 3 MB of some 16.
+  // It is 0.26 for a hundred cells, of which some pages of the grid's arrays, and of what set-up had, are in one run alone: up to 3 MB of
+  // some 16.
   const double of_cell = (taken(cells) - taken(1)) / (cells - 1);
   INFO(of_cell << " MB a cell");
   CHECK(of_cell < 0.31);

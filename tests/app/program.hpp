@@ -90,8 +90,8 @@ using Words = std::vector<std::string>;
 struct Launch {
   int threads = 1, ranks = 1;
   std::string waiting = "OMP_WAIT_POLICY=passive";  // options and variables for env
-  bool overwrite = true;   // results that an earlier run of the test has left in the folder of --out
-  std::string before = {}; // shell commands of each rank before it starts, such as a limit on the size of files
+  bool overwrite = true;                            // results that an earlier run of the test has left in the folder of --out
+  std::string before = {};                          // shell commands of each rank before it starts, such as a limit on the size of files
 };
 
 struct Outcome {
@@ -100,15 +100,14 @@ struct Outcome {
 };
 
 /// The command line that runs the program in `folder`, its screen in screen.txt there. Unless told otherwise
-/// its threads yield while they wait: on a machine with other work, or with one core, they would spend most of their time in each other's way.
+/// its threads yield while they wait: on a machine with other work, or with one core, they would spend most of their time in each other's
+/// way.
 /// @param limit  what stops it after a time, such as "timeout 120", or nothing
 inline std::string command_line(const fs::path& folder, const Words& words, const Launch& launch, const std::string& limit) {
   const auto has = [&](const char* word) { return std::find(words.begin(), words.end(), word) != words.end(); };
-  std::string command = "cd " + quoted(folder.string()) + " && exec " + limit + " env" +
-                        without_mpi_environment() + " " + launch.waiting + " OMP_NUM_THREADS=" +
-                        std::to_string(launch.threads) + " ";
-  if (launch.ranks > 1)
-    command += "mpirun -n " + std::to_string(launch.ranks) + " --oversubscribe --allow-run-as-root ";
+  std::string command = "cd " + quoted(folder.string()) + " && exec " + limit + " env" + without_mpi_environment() + " " + launch.waiting +
+                        " OMP_NUM_THREADS=" + std::to_string(launch.threads) + " ";
+  if (launch.ranks > 1) command += "mpirun -n " + std::to_string(launch.ranks) + " --oversubscribe --allow-run-as-root ";
   std::string program = quoted(CORPUSCLE_PROGRAM);
   for (const auto& word : words) program += " " + quoted(word);
   if (launch.overwrite && has("run") && has("--out") && !has("--restart")) program += " --overwrite";
@@ -144,8 +143,7 @@ inline Outcome succeed(const fs::path& folder, const Words& words, const Launch&
 }
 
 /// A run that must end with `code` and say all of `parts`.
-inline Outcome fail(const fs::path& folder, const Words& words, int code, const Words& parts,
-                    const Launch& launch = {}) {
+inline Outcome fail(const fs::path& folder, const Words& words, int code, const Words& parts, const Launch& launch = {}) {
   const auto outcome = start(folder, words, launch);
   INFO(outcome.output);
   CHECK(outcome.code == code);

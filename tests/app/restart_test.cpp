@@ -20,8 +20,7 @@ Words restarted(Words words, const std::string& checkpoint) {
 
 std::string sphere_in_tube(const fs::path& folder) {
   const auto path = folder / "sphere.toml";
-  std::ofstream(path) << contents(scene("tube_flow"))
-                      << "\n[[bodies]]\nshape = \"sphere\"\nradius_um = 2\ncenter_um = [0.3, 0, -1]\n"
+  std::ofstream(path) << contents(scene("tube_flow")) << "\n[[bodies]]\nshape = \"sphere\"\nradius_um = 2\ncenter_um = [0.3, 0, -1]\n"
                       << "velocity_mm_per_s = [0, 0, 40]\nangular_velocity_rad_per_s = [3e4, 0, 0]\n";
   return path.string();
 }
@@ -47,8 +46,7 @@ void require_same_on(const fs::path& folder, const Words& settings, const std::s
     REQUIRE(found.lines.size() == whole.lines.size());
     double largest = 0;
     for (std::size_t l = 0; l < whole.lines.size(); ++l)
-      for (const auto& column : whole.names)
-        largest = std::max(largest, std::abs(found.number(l, column) - whole.number(l, column)));
+      for (const auto& column : whole.names) largest = std::max(largest, std::abs(found.number(l, column) - whole.number(l, column)));
     INFO("from " << n << " to " << m << " ranks: histories differ by " << largest);
     CHECK(largest < 1e-8);  // um, mm/s, nN: the solvers' tolerances; 2e-10 measured
     const auto r = report(folder / parts);
@@ -87,22 +85,23 @@ TEST_CASE("a checkpoint goes on on any number of ranks, and on the same number w
 TEST_CASE("energies of a run that stopped between samples are those of one that did not") {
   const auto folder = fresh_folder("restart_energy");
   const auto run = [&](const std::string& out, const std::string& end, const Words& more) {
-    succeed(folder, with({"run", scene("capsule_shear"), "--out", out}, {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0",
-                                                                         "output.history_every_us=5000", "time.end_us=" + end}),
+    succeed(folder,
+            with({"run", scene("capsule_shear"), "--out", out}, {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0",
+                                                                 "output.history_every_us=5000", "time.end_us=" + end}),
             {});
-    if (!more.empty())
-      succeed(folder, restarted(with({"run", scene("capsule_shear"), "--out", out}, more), out));
+    if (!more.empty()) succeed(folder, restarted(with({"run", scene("capsule_shear"), "--out", out}, more), out));
   };
   run("whole", "3200", {});
-  run("parts", "1300", {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0", "output.history_every_us=5000", "time.end_us=3200"});
+  run("parts", "1300",
+      {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "output.every_us=0", "output.history_every_us=5000", "time.end_us=3200"});
   CHECK(report(folder / "parts")["energy_fJ"] == report(folder / "whole")["energy_fJ"]);
 }
 
 TEST_CASE("cells that have grown in packing take up membrane viscosity at a restart") {
   const auto folder = fresh_folder("restart_viscous");
   const auto run = [&](const std::string& out, const std::string& end, const Words& more) {
-    const Words common{"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "output.every_us=0", "time.step_us=5", "time.first_step_us=5",
-                       "time.end_us=" + end};
+    const Words common{"grid.nodes=[15,15,65]", "cell_types.0.vertices=300", "output.every_us=0",
+                       "time.step_us=5",        "time.first_step_us=5",      "time.end_us=" + end};
     return with(with({"run", scene("single_file"), "--out", out}, common), more);
   };
   succeed(folder, run("out", "20", {}));

@@ -31,8 +31,8 @@ std::map<std::string, double> differences(const History& a, const History& b) {
 }
 
 #ifdef CORPUSCLE_HDF5
-constexpr const char* state_sets[] = {"velocity", "velocity_old", "pressure",  "flux_i", "flux_j",
-                                      "flux_k",   "membranes",    "classified_positions", "history_levels", "numbers"};
+constexpr const char* state_sets[] = {"velocity",  "velocity_old",         "pressure",       "flux_i", "flux_j", "flux_k",
+                                      "membranes", "classified_positions", "history_levels", "numbers"};
 
 /// The states in two checkpoints are the same to the last bit. @param cut  the cell cuts the grid
 void require_same_state(const fs::path& a, const fs::path& b, bool cell, bool cut = true) {
@@ -52,12 +52,10 @@ void require_same_state(const fs::path& a, const fs::path& b, bool cell, bool cu
 }
 
 /// Run to 12 us in one go, and to 6 us and from there; history and final state must be the same bits.
-void require_same_after_restart(const fs::path& folder, const std::string& name, const Words& settings, bool cell,
-                                bool cut = true) {
+void require_same_after_restart(const fs::path& folder, const std::string& name, const Words& settings, bool cell, bool cut = true) {
   const auto words = [&](const std::string& out, const std::string& end) {
     auto all = settings;
-    all.insert(all.end(), {"grid.nodes=[17,17,25]", "time.step_us=1", "output.history_every_us=1",
-                           "output.checkpoint_every_us=6", end});
+    all.insert(all.end(), {"grid.nodes=[17,17,25]", "time.step_us=1", "output.history_every_us=1", "output.checkpoint_every_us=6", end});
     return with({"run", name, "--out", out}, all);
   };
   succeed(folder, words("whole", "time.end_us=12"));
@@ -127,10 +125,13 @@ TEST_CASE("cells with cytosol that touch move the same on two threads") {
   if (!host_threads) return;
   const auto folder = fresh_folder("threads_of_cells");
   const auto run = [&](const std::string& out, int threads) {
-    succeed(folder, with({"run", scene("two_cells"), "--out", out},
-                         {"grid.nodes=[17,17,17]", "cell_types.0.vertices=200", "cell_types.0.viscosity_ratio=5", "cell_types.0.membrane_viscosity_N_s_per_m=1e-7",
-                          "cells.0.center_um=[0.1,0.2,-1.3]", "cells.1.center_um=[0.1,0.2,1.3]", "fluid.momentum_tolerance=1e-12",
-                          "fluid.divergence_tolerance=1e-12", "time.step_us=5", "time.end_us=200", "output.every_us=0"}), {threads, 1});
+    succeed(folder,
+            with({"run", scene("two_cells"), "--out", out},
+                 {"grid.nodes=[17,17,17]", "cell_types.0.vertices=200", "cell_types.0.viscosity_ratio=5",
+                  "cell_types.0.membrane_viscosity_N_s_per_m=1e-7", "cells.0.center_um=[0.1,0.2,-1.3]", "cells.1.center_um=[0.1,0.2,1.3]",
+                  "fluid.momentum_tolerance=1e-12", "fluid.divergence_tolerance=1e-12", "time.step_us=5", "time.end_us=200",
+                  "output.every_us=0"}),
+            {threads, 1});
     return history(folder / out);
   };
   for (const auto& [column, difference] : differences(run("one", 1), run("two", 2))) {
@@ -148,18 +149,15 @@ TEST_CASE("a restart goes on with the same bits") {
   SECTION("flow without a cell") { require_same_after_restart(folder, scene("tube_flow"), {}, false); }
   SECTION("cell, default coupling") { require_same_after_restart(folder, scene("straight_tube"), {}, true); }
   SECTION("cell without membrane viscosity, steady inlet") {
-    require_same_after_restart(folder, scene("straight_tube"),
-                               {"cells.0.membrane_viscosity_N_s_per_m=0", "boundary.0.ramp_us=0"}, true);
+    require_same_after_restart(folder, scene("straight_tube"), {"cells.0.membrane_viscosity_N_s_per_m=0", "boundary.0.ramp_us=0"}, true);
   }
-  SECTION("cell, steps that grow") {
-    require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.0625"}, true);
-  }
+  SECTION("cell, steps that grow") { require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.0625"}, true); }
   SECTION("cell, steps that are short again after the end of the inlet's ramp") {
     require_same_after_restart(folder, scene("straight_tube"), {"time.first_step_us=0.25", "boundary.0.ramp_us=4"}, true);
   }
   SECTION("cell as a force") {
-    require_same_after_restart(folder, scene("straight_tube"),
-                               {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"}, true, false);
+    require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0"}, true,
+                               false);
   }
   SECTION("cell as a force, with a pressure that jumps") {
     require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=force", "coupling.pressure=sharp"}, true, false);
@@ -167,9 +165,7 @@ TEST_CASE("a restart goes on with the same bits") {
   SECTION("cell as a force, with cytosol and membrane viscosity") {
     require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=force", "cells.0.viscosity_ratio=5"}, true, false);
   }
-  SECTION("cell, iterated coupling") {
-    require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=iterated"}, true);
-  }
+  SECTION("cell, iterated coupling") { require_same_after_restart(folder, scene("straight_tube"), {"coupling.scheme=iterated"}, true); }
   SECTION("cell, iterated coupling with Aitken's relaxation") {
     require_same_after_restart(
         folder, scene("straight_tube"),

@@ -65,8 +65,7 @@ TEST_CASE("of many cells the history has the means, and cells.h5 what each does"
   // Round-off, grown over six steps of solves to 1e-12.
   for (const std::string set : {"x_um", "velocity_um_per_us", "traction_kPa", "per_cell/area_um2", "per_cell/centroid_um"}) {
     INFO(set);
-    CHECK(largest_difference(data_set(folder / "one/cells.h5", last + set), data_set(folder / "two/cells.h5", last + set)) <
-          1e-9);
+    CHECK(largest_difference(data_set(folder / "one/cells.h5", last + set), data_set(folder / "two/cells.h5", last + set)) < 1e-9);
   }
   // What two ranks wrote one goes on from, and four.
   for (int ranks : {1, 4}) {
@@ -119,16 +118,16 @@ TEST_CASE("few cells have lines of their own, whichever ranks have them") {
   const auto two = history(folder / "two");
   REQUIRE(two.lines.size() == one.lines.size());
   for (const char* column : {"centroid_x_um", "velocity_z_mm_per_s", "area_um2", "elastic_energy_fJ", "diameter_um"})
-    for (std::size_t n = 0; n < one.lines.size(); ++n)
-      CHECK(one.number(n, column) == Approx(two.number(n, column)).margin(1e-9));
+    for (std::size_t n = 0; n < one.lines.size(); ++n) CHECK(one.number(n, column) == Approx(two.number(n, column)).margin(1e-9));
 #endif
 }
 
 TEST_CASE("a cell that the flow goes past on both sides is measured along its own axis, not along what rounding moves it") {
   const auto folder = fresh_folder("cell_at_rest");
-  succeed(folder, with({"run", scene("cell_shear"), "--out", "out"},
-                       {"grid.nodes=[13,13,11]", "cells.0.vertices=200", "cells.0.reference=shape", "cells.0.membrane_viscosity_N_s_per_m=1e-8",
-                        "time.end_us=1000", "output.every_us=0", "output.history_every_us=1000", "output.checkpoint_every_us=0"}));
+  succeed(folder,
+          with({"run", scene("cell_shear"), "--out", "out"},
+               {"grid.nodes=[13,13,11]", "cells.0.vertices=200", "cells.0.reference=shape", "cells.0.membrane_viscosity_N_s_per_m=1e-8",
+                "time.end_us=1000", "output.every_us=0", "output.history_every_us=1000", "output.checkpoint_every_us=0"}));
   const auto lines = history(folder / "out");
   const std::size_t last = lines.lines.size() - 1;
   CHECK(lines.number(last, "length_um") < 4);

@@ -7,8 +7,8 @@ using Catch::Contains;
 namespace {
 
 Outcome shell(const fs::path& folder, const std::string& command) {
-  const auto line = "cd " + quoted(folder.string()) + " && timeout 60 env" + without_mpi_environment() +
-                    " OMP_NUM_THREADS=1 bash -c " + quoted(command) + " > screen.txt 2>&1 < /dev/null";
+  const auto line = "cd " + quoted(folder.string()) + " && timeout 60 env" + without_mpi_environment() + " OMP_NUM_THREADS=1 bash -c " +
+                    quoted(command) + " > screen.txt 2>&1 < /dev/null";
   const int status = std::system(line.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(folder / "screen.txt")};
 }
@@ -23,8 +23,7 @@ TEST_CASE("a case comes from a pipe as from a file") {
   const auto folder = fresh_folder("pipe");
   fs::copy_file(CORPUSCLE_SOURCE_DIR "/cases/mills2004.csv", folder / "mills2004.csv");  // what a piped case names lies here
   for (const std::string name : {"couette", "stretch"}) {
-    const auto outcome = shell(folder, program() + "check <(cat " + quoted(scene(name)) + ")" +
-                                           (name == "couette" ? small : ""));
+    const auto outcome = shell(folder, program() + "check <(cat " + quoted(scene(name)) + ")" + (name == "couette" ? small : ""));
     INFO(outcome.output);
     CHECK(outcome.code == 0);
     CHECK_THAT(outcome.output, Contains("is valid"));
@@ -37,8 +36,8 @@ TEST_CASE("a case comes from a pipe as from a file") {
 
 TEST_CASE("a run goes on when nobody reads what it says") {
   const auto folder = fresh_folder("unread");
-  const auto outcome = shell(folder, program() + "run " + quoted(scene("couette")) + small +
-                                         "--out out 2> err.txt | exec 0<&-; exit ${PIPESTATUS[0]}");
+  const auto outcome =
+      shell(folder, program() + "run " + quoted(scene("couette")) + small + "--out out 2> err.txt | exec 0<&-; exit ${PIPESTATUS[0]}");
   INFO(contents(folder / "err.txt"));
   CHECK(outcome.code == 0);
   CHECK(report(folder / "out")["steps"] == 2);
@@ -81,8 +80,8 @@ TEST_CASE("error bars are of the case as it was read, once for each kind, and a 
   std::ofstream(folder / "case.toml") << text;
   Background second(folder, with({"run", "case.toml", "--out", "stopped", "--estimate-error=step"},
                                  {"grid.nodes=[5,5,5]", "time.end_us=6000", "output.every_us=0"}));
-  REQUIRE(second.wait_until([&] { return fs::exists(folder / "stopped/coarser_step/.corpuscle.run") ||
-                                         fs::exists(folder / "stopped/coarser_step"); }));
+  REQUIRE(second.wait_until(
+      [&] { return fs::exists(folder / "stopped/coarser_step/.corpuscle.run") || fs::exists(folder / "stopped/coarser_step"); }));
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   second.send(SIGINT);
   const auto stopped = second.wait();

@@ -23,8 +23,13 @@ std::string checked(const fs::path& folder, const std::string& name, const Words
 TEST_CASE("a load that acts at once on viscous membranes is followed by the first steps") {
   const auto folder = fresh_folder("viscous_start");
   const auto way = [&](const Words& overrides) {
-    const Words all{"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "cell_types.0.membrane_viscosity_N_s_per_m=5e-7",
-                    "time.end_us=60", "output.fields=false", "output.cells=false", "output.history_every_us=60"};
+    const Words all{"grid.nodes=[13,13,13]",
+                    "cell_types.0.vertices=300",
+                    "cell_types.0.membrane_viscosity_N_s_per_m=5e-7",
+                    "time.end_us=60",
+                    "output.fields=false",
+                    "output.cells=false",
+                    "output.history_every_us=60"};
     succeed(folder, with({"run", scene("two_cells"), "--out", "out"}, both(all, overrides)));
     return report(folder / "out")["quantities"]["cell_0_centroid_z_um"].get<double>() + 1.6;
   };
@@ -38,9 +43,17 @@ TEST_CASE("a load that acts at once on viscous membranes is followed by the firs
 
 TEST_CASE("viscous membranes only resist, in steps shorter than the fluid takes to follow them too") {
   const auto folder = fresh_folder("short_viscous_steps");
-  succeed(folder, {"run", scene("two_cells"), "--out", "out", "--set", "grid.nodes=[13,13,13]", "--set", "cell_types.0.vertices=300", "--set",
-                   "cell_types.0.membrane_viscosity_N_s_per_m=1e-6", "--set", "time.step_us=0.25", "--set", "time.first_step_us=0.25", "--set",
-                   "time.end_us=50", "--set", "output.fields=false", "--set", "output.cells=false", "--set", "output.history_every_us=50"});
+  succeed(folder, {"run",   scene("two_cells"),
+                   "--out", "out",
+                   "--set", "grid.nodes=[13,13,13]",
+                   "--set", "cell_types.0.vertices=300",
+                   "--set", "cell_types.0.membrane_viscosity_N_s_per_m=1e-6",
+                   "--set", "time.step_us=0.25",
+                   "--set", "time.first_step_us=0.25",
+                   "--set", "time.end_us=50",
+                   "--set", "output.fields=false",
+                   "--set", "output.cells=false",
+                   "--set", "output.history_every_us=50"});
   const auto found = report(folder / "out");
   const auto energy = found["energy_fJ"];
   const double pushed = energy["pushed"], flow = energy["dissipation"], membranes = energy["membrane_dissipation"];
@@ -57,7 +70,8 @@ TEST_CASE("energies do not depend on how often the history is written") {
   const auto folder = fresh_folder("energy_sampled");
   const auto energy = [&](const std::string& every) {
     succeed(folder, with({"run", scene("capsule_shear"), "--out", "out" + every},
-                         {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "time.end_us=5000", "output.every_us=0", "output.history_every_us=" + every}));
+                         {"grid.nodes=[13,13,13]", "cells.0.vertices=200", "time.end_us=5000", "output.every_us=0",
+                          "output.history_every_us=" + every}));
     return report(folder / ("out" + every))["energy_fJ"];
   };
   const auto often = energy("0"), seldom = energy("5000");
@@ -113,17 +127,21 @@ TEST_CASE("scenes of membranes as forces that cannot be are refused with what he
   const auto refused = [&](const std::string& name, const Words& overrides, const Words& parts) {
     fail(folder, with({"check", scene(name)}, overrides), 2, parts);
   };
-  refused("tube_real", {"grid.nodes=[17,17,27]", "cells.0.vertices=300", "cells.0.center_um=[3,0,0]"}, {"is outside the grid at the start", "center_um"});
+  refused("tube_real", {"grid.nodes=[17,17,27]", "cells.0.vertices=300", "cells.0.center_um=[3,0,0]"},
+          {"is outside the grid at the start", "center_um"});
   refused("two_cells", {"grid.nodes=[5,5,5]", "time.step_us=10"}, {"the grid is too coarse", "grid.nodes"});
   refused("blood_tube", {"grid.diameter_um=1"}, {"one cell has", "the whole grid", "larger grid"});
-  refused("single_file", {"grid.nodes=[15,15,65]", "grid.diameter_um=4"}, {"not even one of its cells fits", "um across", "grid.diameter_um, now 4"});
+  refused("single_file", {"grid.nodes=[15,15,65]", "grid.diameter_um=4"},
+          {"not even one of its cells fits", "um across", "grid.diameter_um, now 4"});
   refused("cell_shear", {"cells.0.dissipation=full"}, {"cells.0.dissipation", "would not turn", "\"central\""});
   const Words drawn{"cells.0.start_stretch = [2, 1, 1]", "area is 15 % off", "draw the cell out less"};
   refused("relax", {"cells.0.start_stretch=[2,1,1]"}, drawn);
 #ifdef CORPUSCLE_MPI
   fail(folder, with({"check", scene("relax")}, {"cells.0.start_stretch=[2,1,1]"}), 2, drawn, {1, 2});
 #endif
-  refused("straight_tube", {"grid.nodes=[17,17,25]", "cells.0.shape=sphere", "cells.0.radius_um=2", "cells.0.reference=shape", "cells.0.start_stretch=[0.8,0.8,2]"},
+  refused("straight_tube",
+          {"grid.nodes=[17,17,25]", "cells.0.shape=sphere", "cells.0.radius_um=2", "cells.0.reference=shape",
+           "cells.0.start_stretch=[0.8,0.8,2]"},
           {"cells.0.start_stretch = [0.8, 0.8, 2]", "draw the cell out less"});
 }
 
@@ -140,8 +158,8 @@ TEST_CASE("a gradient that nothing holds against is warned of") {
 
 TEST_CASE("what is warned of before and during a run is in its report") {
   const auto folder = fresh_folder("told");
-  const Words words = with({"run", scene("two_cells"), "--out", "out"}, {"grid.nodes=[13,13,13]", "cell_types.0.vertices=200", "time.step_us=2",
-                                                                         "time.end_us=4", "output.fields=false"});
+  const Words words = with({"run", scene("two_cells"), "--out", "out"}, {"grid.nodes=[13,13,13]", "cell_types.0.vertices=200",
+                                                                         "time.step_us=2", "time.end_us=4", "output.fields=false"});
   const auto of_ratio = [&] {
     const auto whole = report(folder / "out");
     int found = 0;
@@ -161,9 +179,9 @@ TEST_CASE("what is warned of before and during a run is in its report") {
 
 TEST_CASE("warnings name the keys of types where cells have types") {
   const auto folder = fresh_folder("named_types");
-  succeed(folder, with({"run", scene("two_cells"), "--out", "out"},
-                       {"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=4", "cells.0.start_stretch=[1.5,1,1]",
-                        "output.fields=false"}));
+  succeed(folder,
+          with({"run", scene("two_cells"), "--out", "out"}, {"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2",
+                                                             "time.end_us=4", "cells.0.start_stretch=[1.5,1,1]", "output.fields=false"}));
   const auto warnings = report(folder / "out")["warnings"];
   const auto found = std::find_if(warnings.begin(), warnings.end(), [](const auto& w) { return w["figure"] == "area_drift"; });
   REQUIRE(found != warnings.end());
@@ -177,8 +195,9 @@ TEST_CASE("warnings name the type of the cell whose area has drifted") {
   text << std::ifstream(scene("two_cells")).rdbuf() << "\n[[cell_types]]\nname = \"other\"\nvertices = 300\nshear_modulus_uN_per_m = 5\n";
   const auto key = [&](const std::string& name, const Words& overrides) {
     std::ofstream(folder / (name + ".toml")) << text.str();
-    succeed(folder, with({"run", name + ".toml", "--out", name},
-                         both({"grid.nodes=[13,13,13]", "cell_types.0.vertices=300", "time.step_us=2", "time.end_us=4", "output.fields=false"}, overrides)));
+    succeed(folder, with({"run", name + ".toml", "--out", name}, both({"grid.nodes=[13,13,13]", "cell_types.0.vertices=300",
+                                                                       "time.step_us=2", "time.end_us=4", "output.fields=false"},
+                                                                      overrides)));
     const auto warnings = report(folder / name)["warnings"];
     for (const auto& w : warnings)
       if (w["figure"] == "area_drift") return w["key"].template get<std::string>();

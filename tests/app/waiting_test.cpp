@@ -92,8 +92,7 @@ TEST_CASE("ranks of several threads are started as by the launcher") {
   const auto folder = fresh_folder("waiting_ranks");
   auto launch = plainly(2);
   launch.ranks = 2;
-  succeed(folder, with({"run", scene("tube_flow"), "--out", "out"}, {"grid.nodes=[9,9,13]", "time.step_us=1", "time.end_us=2"}),
-          launch);
+  succeed(folder, with({"run", scene("tube_flow"), "--out", "out"}, {"grid.nodes=[9,9,13]", "time.step_us=1", "time.end_us=2"}), launch);
   const auto r = report(folder / "out");
   CHECK(r["ranks"] == 2);
   CHECK_THAT(r["waiting"].get<std::string>(), Contains("GOMP_SPINCOUNT="));

@@ -59,17 +59,25 @@ center_um = [0, 0, 0]
 }  // namespace
 
 TEST_CASE("bad figures become warnings with their key, good ones do not") {
-  const nlohmann::json bad = {{"slip", 0.26}, {"energy_balance", 0.4}, {"flux_correction", 1.0}, {"splitting", 0.01},
-                              {"max_divergence", 7e-11}, {"coupling_residual", nullptr}};
+  const nlohmann::json bad = {{"slip", 0.26},      {"energy_balance", 0.4},   {"flux_correction", 1.0},
+                              {"splitting", 0.01}, {"max_divergence", 7e-11}, {"coupling_residual", nullptr}};
   const auto warnings = judge(bad, moving);
   CHECK(figures_of(warnings) == Words{"flux_correction", "splitting", "slip", "energy_balance"});
   CHECK(warnings[1]["key"] == "time.step_us");
   CHECK(warnings[1]["value"] == 0.01);
   CHECK_THAT(warnings[2]["message"].get<std::string>(), Contains("slip = 0.26, more than 0.15") && Contains("grid.nodes"));
   // The tube with a cell at 400 us, and the poorest of the good runs of a held sphere.
-  const nlohmann::json good = {{"area_drift", 0.0064}, {"coupling_residual", 0.03}, {"energy_balance", 0.012}, {"energy_balance_coupling", 0.003},
-                               {"flux_correction", 0.0022}, {"max_divergence", 7.2e-11}, {"slip", 0.11}, {"splitting", 4e-4},
-                               {"volume_drift", 1.2e-6}, {"least_wall_spacings", 3.1}, {"traction_fallbacks", 0.0}};
+  const nlohmann::json good = {{"area_drift", 0.0064},
+                               {"coupling_residual", 0.03},
+                               {"energy_balance", 0.012},
+                               {"energy_balance_coupling", 0.003},
+                               {"flux_correction", 0.0022},
+                               {"max_divergence", 7.2e-11},
+                               {"slip", 0.11},
+                               {"splitting", 4e-4},
+                               {"volume_drift", 1.2e-6},
+                               {"least_wall_spacings", 3.1},
+                               {"traction_fallbacks", 0.0}};
   CHECK(judge(good, moving).empty());
   CHECK(figures_of(judge({{"least_body_spacings", 1.2}}, moving)) == Words{"least_body_spacings"});
   CHECK(figures_of(judge({{"slip", std::nan("")}}, moving)) == Words{"slip"});
@@ -112,8 +120,8 @@ TEST_CASE("what membranes as forces leave of the energy is judged by their own g
 }
 
 TEST_CASE("a share of nothing is no warning") {
-  const nlohmann::json still = {{"slip", 0.5}, {"energy_balance", 0.9}, {"flux_correction", 1.0}, {"splitting", 0.3},
-                                {"convection_over_viscosity", 0.2}};
+  const nlohmann::json still = {
+      {"slip", 0.5}, {"energy_balance", 0.9}, {"flux_correction", 1.0}, {"splitting", 0.3}, {"convection_over_viscosity", 0.2}};
   CHECK(judge(still, {0, 0, false}).empty());
   CHECK(figures_of(judge(still, {0, 0, true})) == Words{"convection_over_viscosity"});
 }
@@ -161,9 +169,9 @@ TEST_CASE("the sheet of a capsule may grow where a red cell would burst") {
                "[[cells]]\nshape = \"sphere\"\nradius_um = 3\nvertices = 200\nlaw = \"neo-hookean\"\nshear_modulus_uN_per_m = 0.2\n"
                "center_um = [0, 0, 0]");
   std::ofstream(folder / "capsule.toml") << text;
-  succeed(folder, with({"run", "capsule.toml", "--out", "out"},
-                       {"grid.nodes=[17,17,25]", "boundary.0.velocity_mm_per_s=10", "time.step_us=1", "time.end_us=210",
-                        "output.every_us=210", "output.fields=false"}));
+  succeed(folder,
+          with({"run", "capsule.toml", "--out", "out"}, {"grid.nodes=[17,17,25]", "boundary.0.velocity_mm_per_s=10", "time.step_us=1",
+                                                         "time.end_us=210", "output.every_us=210", "output.fields=false"}));
   const auto found = history(folder / "out");
   CHECK(found.number(found.lines.size() - 1, "area_um2") > 1.12 * found.number(0, "area_um2"));
   CHECK(found.number(found.lines.size() - 1, "volume_um3") == Approx(found.number(0, "volume_um3")).epsilon(1e-4));
@@ -181,21 +189,25 @@ TEST_CASE("a cell that is alone but near its own image is warned of as two cells
     out.close();
     const std::string half = std::to_string(side / 2);
     return start(folder, with({"check", "alone.toml"}, {"grid.lower_um=[-" + half + ",-" + half + ",-" + half + "]",
-                                                         "grid.upper_um=[" + half + "," + half + "," + half + "]"}))
+                                                        "grid.upper_um=[" + half + "," + half + "," + half + "]"}))
         .output;
   };
   CHECK_THAT(scene_of(8.2), Contains("cells.0 is 0.41") && Contains("um from its own image") && Contains("add [contact]"));
   CHECK_THAT(scene_of(12), !Contains("own image"));
-  CHECK_THAT(start(folder, with({"check", "alone.toml"}, {"grid.lower_um=[-6,-6,-6]", "grid.upper_um=[6,6,6]", "output.fields=[\"wall_shear_stress\"]"})).output, Contains("output.fields") && Contains("no side is a wall"));
+  CHECK_THAT(start(folder, with({"check", "alone.toml"},
+                                {"grid.lower_um=[-6,-6,-6]", "grid.upper_um=[6,6,6]", "output.fields=[\"wall_shear_stress\"]"}))
+                 .output,
+             Contains("output.fields") && Contains("no side is a wall"));
 }
 
 TEST_CASE("membrane viscosity that drives instead of resisting is told") {
   const auto folder = fresh_folder("driven");
   // Two cells that start deep in their aggregation.
-  succeed(folder, with({"run", scene("two_cells"), "--out", "out"},
-                       {"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "cell_types.0.membrane_viscosity_N_s_per_m=5e-7", "time.step_us=2.5",
-                        "time.first_step_us=2.5", "time.end_us=100", "output.every_us=0", "contact.aggregation_energy_fJ_per_um2=1e-3",
-                        "cells.0.center_um=[0.1,0.2,-1.35]", "cells.1.center_um=[0.1,0.2,1.35]"}));
+  succeed(folder,
+          with({"run", scene("two_cells"), "--out", "out"},
+               {"grid.nodes=[17,17,17]", "cell_types.0.vertices=300", "cell_types.0.membrane_viscosity_N_s_per_m=5e-7", "time.step_us=2.5",
+                "time.first_step_us=2.5", "time.end_us=100", "output.every_us=0", "contact.aggregation_energy_fJ_per_um2=1e-3",
+                "cells.0.center_um=[0.1,0.2,-1.35]", "cells.1.center_um=[0.1,0.2,1.35]"}));
   const auto driven = report(folder / "out");
   CHECK(driven["errors"]["membrane_drive"] > 0.1);
   const auto names = figures_of(driven["warnings"]);

@@ -52,8 +52,7 @@ TriangleMesh moved(TriangleMesh mesh, const Triple& by) {
 
 /// Columns of CellFlowColumn, of cells that move as `velocity(x)` says.
 template <class Velocity>
-std::vector<double> sums_of(const FlowFrame& frame, int bins, const std::vector<TriangleMesh>& meshes,
-                            const Velocity& velocity) {
+std::vector<double> sums_of(const FlowFrame& frame, int bins, const std::vector<TriangleMesh>& meshes, const Velocity& velocity) {
   const int cells = static_cast<int>(meshes.size());
   const SurfaceSet set = make_surface_set(meshes, cells);
   const auto v = Kokkos::create_mirror_view(set.v);
@@ -105,9 +104,7 @@ TEST_CASE("a cell's volume within each radius and its flow are exact", "[blood]"
     const Vec3 center{1.5, 1, 3};
     const auto beside = moved(sphere, {1.5, 1, 3});
     const Vec3 spin{0.2, 0.5, -0.3};
-    const auto sums = sums_of(frame, bins, {beside}, [&](const Vec3& x) {
-      return Vec3{0, 0, 0.1} + cross(spin, x - center);
-    });
+    const auto sums = sums_of(frame, bins, {beside}, [&](const Vec3& x) { return Vec3{0, 0, 0.1} + cross(spin, x - center); });
     Sums<10> moments;
     for (const auto& t : beside.triangles) {
       Vec3 corner[3];
@@ -141,9 +138,7 @@ TEST_CASE("a bent tube has the coordinates that it was made with", "[blood]") {
   const auto sphere = moved(ellipsoid_mesh({size, size, size}, 2000), center);
   // Carried around the arc's centre as a whole: along the centreline all of it goes at rate x bend.
   constexpr double rate = 0.01;
-  const auto sums = sums_of(frame, bins, {sphere}, [&](const Vec3& x) {
-    return rate * cross(Vec3{0, 1, 0}, x - Vec3{bend, 0, 0});
-  });
+  const auto sums = sums_of(frame, bins, {sphere}, [&](const Vec3& x) { return rate * cross(Vec3{0, 1, 0}, x - Vec3{bend, 0, 0}); });
   CHECK(sums[CellFlowColumn::flow] == Approx(volume(sphere) * rate * bend).epsilon(1e-3));
   CHECK(sums[CellFlowColumn::within + bins - 1] == Approx(volume(sphere)).epsilon(1e-3));
   // Against counting: random points in the sphere within a radius of 2 um of the centreline.
@@ -170,8 +165,7 @@ TEST_CASE("the cell-free layer is what the outermost membranes leave, seen from 
   // Two on opposite sides: in the direction of either the nearer one counts.
   double both = 0;
   for (int k = 0; k < 16; ++k) both += 5 - (2 + 1.5 * std::abs(std::cos(2 * pi * k / 16))) * 1.0;
-  CHECK(layer_of(frame, {moved(sphere, {1.5, 0, 4}), moved(sphere, {-1.5, 0, -4})}, 1) ==
-        Approx(both / 16).margin(0.02));
+  CHECK(layer_of(frame, {moved(sphere, {1.5, 0, 4}), moved(sphere, {-1.5, 0, -4})}, 1) == Approx(both / 16).margin(0.02));
   // A mesh far coarser than the windows leaves none out.
   const double coarse = layer_of(frame, {ellipsoid_mesh({2, 2, 2}, 42)}, 100), fine = layer_of(frame, {sphere}, 100);
   CHECK(coarse == Approx(fine).margin(0.2));
@@ -181,11 +175,8 @@ TEST_CASE("the cell-free layer is what the outermost membranes leave, seen from 
   CHECK(split == Approx(whole).margin(0.02));
   // Nor does it matter much where the windows are: a tip that looks into one, which alone would leave 4.6 um, does not
   // count as a window full of cell (then it would be 3.4 um).
-  for (const double shift : {0.05, 0.3, 0.5, 0.9})
-    CHECK(layer_of(frame, {moved(sphere, {0, 0, shift})}, 20) == Approx(whole).margin(0.08));
-  CHECK(
-      whole ==
-      Approx(5 - 0.5 * (2 + std::sqrt(3.0))).margin(0.03));  // two windows a side, of which one is a um off the middle
+  for (const double shift : {0.05, 0.3, 0.5, 0.9}) CHECK(layer_of(frame, {moved(sphere, {0, 0, shift})}, 20) == Approx(whole).margin(0.08));
+  CHECK(whole == Approx(5 - 0.5 * (2 + std::sqrt(3.0))).margin(0.03));  // two windows a side, of which one is a um off the middle
 }
 
 TEST_CASE("plasma alone is solved for on a piece of few cells, of any section", "[blood]") {
@@ -232,9 +223,8 @@ StressError poiseuille_stress_error(GridSettings::CrossSection map, int across) 
   Grid grid(Comm(), make_node_source(*scene.grid), {false, false, true});
   const IndexSpace& index = grid.index();
   FluidSolver fluid(grid, *scene.fluid, scene.boundaries, &*scene.grid);
-  for (int n = 1; n <= 5; ++n)
-    fluid.begin_step(1000), fluid.solve(1000.0 * n, nullptr);  // steps of 300 times the slowest decay
-  const double exact = 1e-3 * radius / 2;                      // half the gradient times the radius, kPa
+  for (int n = 1; n <= 5; ++n) fluid.begin_step(1000), fluid.solve(1000.0 * n, nullptr);  // steps of 300 times the slowest decay
+  const double exact = 1e-3 * radius / 2;                                                 // half the gradient times the radius, kPa
   StressError error;
   const Components<double> stress("corpuscle::test::stress", index.size(), 3);
   find_wall_stress(scene.boundaries, fluid, stress);

@@ -124,9 +124,8 @@ TEST_CASE("reported means and errors have the samples' values, in the report's u
   } else {
     const double relative = means.mean(drag) / (viscosity * means.mean(wall_rate));
     CHECK(number("relative_apparent_viscosity") == Approx(relative));
-    CHECK(number("relative_apparent_viscosity_error") ==
-          Approx(error_of(means, drag) / (viscosity * means.mean(wall_rate)) +
-                 relative * error_of(means, wall_rate) / means.mean(wall_rate)));
+    CHECK(number("relative_apparent_viscosity_error") == Approx(error_of(means, drag) / (viscosity * means.mean(wall_rate)) +
+                                                                relative * error_of(means, wall_rate) / means.mean(wall_rate)));
   }
   CHECK(number("cell_free_layer_error_um") == Approx(error_of(means, layer)));
   const auto profile = sampler.profile();

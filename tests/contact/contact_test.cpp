@@ -55,8 +55,7 @@ SurfaceSet red_cell() {
 
 }  // namespace
 
-TEST_CASE("the law is the derivative of its energy, without bound at no gap and nothing beyond its reach",
-          "[contact]") {
+TEST_CASE("the law is the derivative of its energy, without bound at no gap and nothing beyond its reach", "[contact]") {
   ContactLaw law;
   law.range = 0.25, law.pressure = 0.02, law.knee = GENERATE(0.0, 0.07);
   law.depth = 1e-3, law.reach = 0.6, law.steepness = 4 / 0.35;
@@ -119,11 +118,9 @@ TEST_CASE("gaps and forces of two spheres are those of spheres", "[contact]") {
     double exact = 0;
     constexpr int steps = 20000;
     for (int n = 0; n < steps; ++n) {
-      const double angle = (n + 0.5) * std::acos(-1.0) / steps, z = radius * std::cos(angle),
-                   r = radius * std::sin(angle);
+      const double angle = (n + 0.5) * std::acos(-1.0) / steps, z = radius * std::cos(angle), r = radius * std::sin(angle);
       const double distance = std::hypot(r, 4 + gap - z);
-      exact += law.repulsion(distance - radius) * (4 + gap - z) / distance * 2 * std::acos(-1.0) * r * radius *
-               std::acos(-1.0) / steps;
+      exact += law.repulsion(distance - radius) * (4 + gap - z) / distance * 2 * std::acos(-1.0) * r * radius * std::acos(-1.0) / steps;
     }
     const Totals lower = totals(set, forces_of(contact, set, dt, false), 0);
     error[fine] = std::abs(-lower.force.z / exact - 1);
@@ -169,9 +166,8 @@ TEST_CASE("forces add up to no force and no torque, and are the gradient of the 
 TEST_CASE("lists find what looking at every triangle finds", "[contact]") {
   const double range = 0.3, blend = 0.7;
   // Three spheres, one of which is near to its own image and to another beyond a periodic side.
-  SurfaceSet set =
-      cells_of({sphere_mesh(2, {0, 0, 0}, 0.4), transform(sphere_mesh(1.6, {0, 0, 0}, 0.3), {1, 2, 3}, 0, {0, 0, 3.7}),
-                transform(sphere_mesh(1.5, {0, 0, 0}, 0.5), {2, 1, 3}, 0, {3.65, 0.2, 0.3})});
+  SurfaceSet set = cells_of({sphere_mesh(2, {0, 0, 0}, 0.4), transform(sphere_mesh(1.6, {0, 0, 0}, 0.3), {1, 2, 3}, 0, {0, 0, 3.7}),
+                             transform(sphere_mesh(1.5, {0, 0, 0}, 0.5), {2, 1, 3}, 0, {3.65, 0.2, 0.3})});
   Images images;
   images.count = 3;
   images.shift[1] = {7.6, 0.1, 0}, images.shift[2] = -images.shift[1];
@@ -220,9 +216,7 @@ TEST_CASE("lists find what looking at every triangle finds", "[contact]") {
     CHECK(beyond > 10);
     // On within the skin, and the last time far beyond it.
     const double step = round == 2 ? 0.2 : 0.02;
-    move_vertices(set, [&](int body, const Vec3& p) {
-      return p + step * Vec3{body == 0 ? 0.3 : -0.1, 0.2 * body, -0.05 * body};
-    });
+    move_vertices(set, [&](int body, const Vec3& p) { return p + step * Vec3{body == 0 ? 0.3 : -0.1, 0.2 * body, -0.05 * body}; });
     contact.look(0, dt);
   }
   CHECK(contact.report().crossings == 0);
@@ -274,8 +268,8 @@ TEST_CASE("surfaces that cross are seen, counted and parted", "[contact]") {
   contact.look(11, dt);
   CHECK(contact.report().crossings == counted);
   move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 1.0 : 0.0}; });
-  CHECK_THROWS_WITH(contact.look(12, dt), Catch::Contains("surfaces cross: cells.") && Catch::Contains("um at 12 us") &&
-                                              Catch::Contains("time.step_us"));
+  CHECK_THROWS_WITH(contact.look(12, dt),
+                    Catch::Contains("surfaces cross: cells.") && Catch::Contains("um at 12 us") && Catch::Contains("time.step_us"));
   CHECK_THROWS_AS(
       [&] {
         move_vertices(set, [&](int b, const Vec3& p) { return p - Vec3{0, 0, b == 1 ? 0.3 : 0.0}; });
@@ -333,8 +327,9 @@ TEST_CASE("what goes further in a step than contact can follow is refused, wheth
   }
   SECTION("two bodies, through each other, but no further than lists take in") {
     moving(-1, {0, 0, GENERATE(-0.43, 0.43)});
-    CHECK_THROWS_WITH(contact.look(5, dt), Catch::Contains("go through each other, by 0.43 um") && Catch::Contains("cells.0") && Catch::Contains("cells.1") &&
-                                               Catch::Contains("contact.range_um = 0.25") && Catch::Contains("time.step_us"));
+    CHECK_THROWS_WITH(contact.look(5, dt), Catch::Contains("go through each other, by 0.43 um") && Catch::Contains("cells.0") &&
+                                               Catch::Contains("cells.1") && Catch::Contains("contact.range_um = 0.25") &&
+                                               Catch::Contains("time.step_us"));
   }
   SECTION("past each other") {
     moving(-1, {0.28, 0, 0});
@@ -360,9 +355,7 @@ TEST_CASE("no move takes more than half of a gap away", "[contact]") {
   const auto gaps = on_host(contact.gaps());
   const std::vector<double> before(gaps.data(), gaps.data() + gaps.span());
   const double way = GENERATE(0.01, 0.09, 0.2);
-  move_vertices(set, [&](int body, const Vec3& p) {
-    return p - Vec3{0, 0, body == 1 ? way : 0.0} + 0.01 * noise.vector();
-  });
+  move_vertices(set, [&](int body, const Vec3& p) { return p - Vec3{0, 0, body == 1 ? way : 0.0} + 0.01 * noise.vector(); });
   const auto moved = on_host(set.x);
   contact.limit_approach(0);
   CHECK((contact.report().limited > 0) == (way > 0.02));
@@ -371,16 +364,14 @@ TEST_CASE("no move takes more than half of a gap away", "[contact]") {
   const auto kept = on_host(set.x);
   double most = 0;
   Vec3 sum;
-  for (int v = 0; v < set.vertices; ++v)
-    most = std::max(most, norm(load(kept, v) - load(moved, v))), sum += load(kept, v) - load(moved, v);
+  for (int v = 0; v < set.vertices; ++v) most = std::max(most, norm(load(kept, v) - load(moved, v))), sum += load(kept, v) - load(moved, v);
   if (way < 0.02) CHECK(most == 0);
   CHECK(norm(sum) < 1e-12);  // equal and opposite
   contact.look(0, dt);
   CHECK(contact.report().crossings == counted);
   const auto after = on_host(contact.gaps());
   for (int v = 0; v < set.vertices; ++v)
-    if (before[v] < 0.2)
-      CHECK(after(v) > 0.35 * before[v]);  // the nearest point moves on, and the correction has passes
+    if (before[v] < 0.2) CHECK(after(v) > 0.35 * before[v]);  // the nearest point moves on, and the correction has passes
 }
 
 TEST_CASE("a membrane that buckles at the scale of its mesh does not touch itself", "[contact]") {
@@ -405,8 +396,7 @@ TEST_CASE("a membrane that buckles at the scale of its mesh does not touch itsel
   }
 }
 
-TEST_CASE("a cell does not touch itself as it is, is pushed apart where it is pinched, and does not go through itself",
-          "[contact]") {
+TEST_CASE("a cell does not touch itself as it is, is pushed apart where it is pinched, and does not go through itself", "[contact]") {
   SurfaceSet set = red_cell();
   Contact contact(settings(0.25), set, Images{}, mu, 0);
   contact.look_at_start(dt);
@@ -458,7 +448,8 @@ TEST_CASE("on which side of a sharp fold a point is does not depend on which of 
   int asked = 0, by_features = 0, by_triangles = 0;
   const auto ask = [&](int counted, int& total) {
     Kokkos::parallel_reduce(
-        "corpuscle::test::sides", Policy(0, 200), KOKKOS_LAMBDA(int n, int& sum) {
+        "corpuscle::test::sides", Policy(0, 200),
+        KOKKOS_LAMBDA(int n, int& sum) {
           const double angle = 0.0314159 * n, across = 0.3 * std::sin(angle), out = 0.02 + 0.1 * std::fabs(std::cos(angle));
           const Vec3 p = n % 2 == 0 ? Vec3{1 + out, 1 + out, across} : Vec3{2 + out, 0, across};
           double least = 1e300;
@@ -505,7 +496,8 @@ TEST_CASE("a triangle that is squeezed flat, or turned over, does not say which 
   // Above and below the triangle and what lies beside it; turned over far it may hide that a point is inside, never that one is outside.
   const auto ask = [&](bool by_normals, int& total) {
     Kokkos::parallel_reduce(
-        "corpuscle::test::sides", Policy(0, points), KOKKOS_LAMBDA(int n, int& sum) {
+        "corpuscle::test::sides", Policy(0, points),
+        KOKKOS_LAMBDA(int n, int& sum) {
           const bool outside = n % 2 == 0;
           if (!outside && over > 1.2) return;
           const Vec3 p = foot + (0.008 * (n / 2 % 100 - 50)) * along + (0.25 * (n / 200)) * ahead + (outside ? 0.08 : -0.08) * outward;
@@ -544,7 +536,8 @@ TriangleMesh large_sphere(double radius, int around, int along) {
   for (int i = 1; i < along; ++i)
     for (int j = 0; j < around; ++j) {
       const double theta = pi * i / along, phi = 2 * pi * j / around;
-      mesh.vertices.push_back({radius * std::sin(theta) * std::cos(phi), radius * std::sin(theta) * std::sin(phi), radius * std::cos(theta)});
+      mesh.vertices.push_back(
+          {radius * std::sin(theta) * std::cos(phi), radius * std::sin(theta) * std::sin(phi), radius * std::cos(theta)});
     }
   const auto number = [&](int i, int j) { return 2 + (i - 1) * around + j % around; };
   for (int half = 0; half < 2; ++half)

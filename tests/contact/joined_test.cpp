@@ -51,7 +51,8 @@ TEST_CASE("cells and the images of rigid bodies are joined as if made together",
     return mesh;
   };
   const Vec3 shift{0, 0, 12};
-  const SurfaceSet templates = make_surface_set({one, other}), cells = cells_of({other, one, other}), rigid = make_surface_set({rock, stone});
+  const SurfaceSet templates = make_surface_set({one, other}), cells = cells_of({other, one, other}),
+                   rigid = make_surface_set({rock, stone});
   const SurfaceSet together = make_surface_set({other, one, other, rock, stone, moved(rock, shift)}, 3);
   const Array<int> type("corpuscle::test::type", 3);
   const auto host = Kokkos::create_mirror_view(type);

@@ -103,8 +103,8 @@ TEST_CASE("memory grows with a rank's own cells alone", "[coupling][cells][memor
     cells.push_back(comm.sum(static_cast<double>(held.own + held.copies)));
     own_mb.push_back(comm.sum(held.mb - grid));
     if (std::getenv("CORPUSCLE_SHOW"))
-      WARN(fmt::format("rank {} of {}: {} cells, {} copies: {:.3f} MB beside the grid's {:.3f}", comm.rank(), comm.size(),
-                       held.own, held.copies, held.mb - grid, grid));
+      WARN(fmt::format("rank {} of {}: {} cells, {} copies: {:.3f} MB beside the grid's {:.3f}", comm.rank(), comm.size(), held.own,
+                       held.copies, held.mb - grid, grid));
     // A rank's share, and what does not grow with it: copies are of a block's surface.
     CHECK(held.mb - grid < 0.3 * held.own + 20);
   }

@@ -51,8 +51,7 @@ TEST_CASE("a cell in the tube keeps its volume and the fluid its divergence", "[
   CHECK(outcome.cell.velocity_um_per_us[2] > 2e-3);
   CHECK(outcome.cell.velocity_um_per_us[2] < 4e-3);
   // The tube is symmetric; what is left is the mesh's own irregularity.
-  CHECK(std::hypot(outcome.cell.velocity_um_per_us[0], outcome.cell.velocity_um_per_us[1]) <
-        0.01 * outcome.cell.velocity_um_per_us[2]);
+  CHECK(std::hypot(outcome.cell.velocity_um_per_us[0], outcome.cell.velocity_um_per_us[1]) < 0.01 * outcome.cell.velocity_um_per_us[2]);
 }
 
 TEST_CASE("a cell takes the same shape at both ends of a long tube, where the level of the pressure differs", "[coupling]") {
@@ -96,8 +95,7 @@ TEST_CASE("the fixed point of the iterated coupling does not depend on the Robin
 TEST_CASE("a coupling that cannot be stable is refused with the reason", "[coupling]") {
   Timers timers;
   const auto light = scenes::tube_with_cell(21, 31, 100, Scheme::loose, 10);
-  CHECK_THROWS_WITH(FlowSimulation(Comm(), light, timers), Catch::Contains("coupling.scheme") &&
-                                                               Catch::Contains("cells.0.mass_pg"));
+  CHECK_THROWS_WITH(FlowSimulation(Comm(), light, timers), Catch::Contains("coupling.scheme") && Catch::Contains("cells.0.mass_pg"));
   CHECK_THROWS_AS(FlowSimulation(Comm(), light, timers), InputError);
   const auto heavy = scenes::tube_with_cell(21, 31, 7200, Scheme::loose, 10);
   CHECK(FlowSimulation(Comm(), heavy, timers).coupling()->stability(1)->margin() > 1);

@@ -43,8 +43,7 @@ Case pressed_cells(double gap_um, double push_nN, double step_us, double end_us,
 
 }  // namespace
 
-TEST_CASE("two cells pressed face to face do not cross, keep their volume, and the energy balances",
-          "[coupling][contact]") {
+TEST_CASE("two cells pressed face to face do not cross, keep their volume, and the energy balances", "[coupling][contact]") {
   // From where the film drains, and from where contact acts at once; steps of half the largest stable one and more.
   struct Setting {
     double gap, push, step, end, balance;
@@ -70,8 +69,8 @@ TEST_CASE("two cells pressed face to face do not cross, keep their volume, and t
   const auto contact = *simulation.coupling()->contact_report();
   const auto cells = simulation.membranes()->diagnostics();
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("gap {:.3f} um, {} crossed, {} lists, energy off by {:.4f} of {:.3g} fJ", contact.smallest_gap,
-                     contact.crossings, contact.lists, *energy.imbalance(), energy.largest_fJ()));
+    WARN(fmt::format("gap {:.3f} um, {} crossed, {} lists, energy off by {:.4f} of {:.3g} fJ", contact.smallest_gap, contact.crossings,
+                     contact.lists, *energy.imbalance(), energy.largest_fJ()));
   CHECK(contact.crossings == 0);
   CHECK(contact.smallest_gap > 0);
   CHECK(contact.smallest_gap < s.gap + 0.05);  // the first cell is 2.56 um thick; the load is borne 0.2 um apart
@@ -103,8 +102,7 @@ TEST_CASE("cells that cross in a run are put back and counted, and the run goes 
   CHECK(crossings > 0);
   while (!simulation.done()) simulation.step();
   CHECK(coupling->contact_report()->crossings == crossings);
-  for (const auto& cell : simulation.membranes()->diagnostics())
-    CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-3));
+  for (const auto& cell : simulation.membranes()->diagnostics()) CHECK(cell.volume_um3 == Approx(cell.rest_volume_um3).epsilon(1e-3));
 }
 
 TEST_CASE("cells at rest that do not touch stay as if there were no contact", "[coupling][contact]") {
@@ -204,10 +202,13 @@ TEST_CASE("cells that go further in a step than contact can follow stop all rank
   // have changed too much before.
   Timers timers;
   FlowSimulation simulation(Comm(), pressed_cells(0.6, -20, 20, 400, 0.75), timers);
-  CHECK_THROWS_WITH([&] {
-    while (!simulation.done()) simulation.step();
-  }(), (Catch::Contains("contact: cells.") && Catch::Contains(" um in a step of 20 us") && Catch::Contains("beyond the mean of all") &&
-           Catch::Contains("time.step_us")) || Catch::Contains("the area of cells."));
+  CHECK_THROWS_WITH(
+      [&] {
+        while (!simulation.done()) simulation.step();
+      }(),
+      (Catch::Contains("contact: cells.") && Catch::Contains(" um in a step of 20 us") && Catch::Contains("beyond the mean of all") &&
+       Catch::Contains("time.step_us")) ||
+          Catch::Contains("the area of cells."));
 }
 
 TEST_CASE("a torn membrane that crosses another is told as torn", "[coupling][contact]") {
@@ -225,15 +226,18 @@ TEST_CASE("a torn membrane that crosses another is told as torn", "[coupling][co
     x(lowest, 2) -= 1.6;  // twice its links, and through the other cell's nearer side
   }
   Kokkos::deep_copy(set.x, x);
-  CHECK_THROWS_WITH(simulation.coupling()->resume(0), Catch::Contains("membrane overstretched: cells.1") && !Catch::Contains("surfaces cross"));
+  CHECK_THROWS_WITH(simulation.coupling()->resume(0),
+                    Catch::Contains("membrane overstretched: cells.1") && !Catch::Contains("surfaces cross"));
 }
 
 TEST_CASE("a cell whose area has changed too much stops the run, whatever it stores", "[coupling][contact]") {
   Timers timers;
   FlowSimulation simulation(Comm(), pressed_cells(0.8, 5, 20, 400, 0.75), timers);
-  CHECK_THROWS_WITH([&] {
-    while (!simulation.done()) simulation.step();
-  }(), Catch::Contains("membrane: the area of cells.") && Catch::Contains("area_modulus_uN_per_m"));
+  CHECK_THROWS_WITH(
+      [&] {
+        while (!simulation.done()) simulation.step();
+      }(),
+      Catch::Contains("membrane: the area of cells.") && Catch::Contains("area_modulus_uN_per_m"));
 }
 
 #ifdef CORPUSCLE_HDF5
@@ -267,8 +271,7 @@ TEST_CASE("pressed cells on several ranks move as on one", "[coupling][contact][
   const ContactReport one = *alone.coupling()->contact_report(), all = *shared.coupling()->contact_report();
   CHECK(one.smallest_gap < 0.25);
   CHECK(alone.coupling()->energy_of_cells(20).contact > 0);
-  CHECK(largest_difference(positions(alone), positions(shared)) <
-        1e-9);  // um: round-off, and the solvers' last residuals
+  CHECK(largest_difference(positions(alone), positions(shared)) < 1e-9);  // um: round-off, and the solvers' last residuals
   // Every rank has the figures of all.
   CHECK(all.smallest_gap == Approx(one.smallest_gap).margin(1e-8));
   CHECK(all.smallest_wall_gap == Approx(one.smallest_wall_gap).margin(1e-8));

@@ -174,8 +174,7 @@ TEST_CASE("a cell's motion does not depend on how the domain is cut over ranks",
   shared.coupling()->tractions_for_output();
   // 2 mu speed / h is the scale of the stress: h = 0.7 um.
   CHECK(largest_difference(traction, shared.immersed()->last_tractions(), none) / (3 * speed) < 1e-9);
-  if (alone.membranes())
-    CHECK(alone.coupling()->stability(4)->beta == Approx(shared.coupling()->stability(4)->beta).epsilon(1e-14));
+  if (alone.membranes()) CHECK(alone.coupling()->stability(4)->beta == Approx(shared.coupling()->stability(4)->beta).epsilon(1e-14));
   const Triple a = alone.immersed()->balance_forces()[0], b = shared.immersed()->balance_forces()[0];
   for (int m = 0; m < 3; ++m) CHECK(a[m] == Approx(b[m]).margin(1e-10));
 }

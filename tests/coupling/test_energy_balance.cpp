@@ -41,8 +41,7 @@ Outcome run(const Case& scene, double from_us = 0) {
     balance.sample(elastic());
     outcome.last_dissipation_nW = (balance.totals().dissipation - before) / simulation.last_step_us();
   }
-  if (auto* bodies = simulation.rigid_bodies())
-    outcome.torque_z = simulation.immersed()->loads({bodies->centre(0)})[0][1][2];
+  if (auto* bodies = simulation.rigid_bodies()) outcome.torque_z = simulation.immersed()->loads({bodies->centre(0)})[0][1][2];
   outcome.totals = balance.totals();
   outcome.imbalance = balance.imbalance().value();
   outcome.coupling = balance.coupling_imbalance().value();
@@ -171,8 +170,7 @@ TEST_CASE("the work of a sphere that moves in a box is dissipated around it", "[
   CHECK(dissipation[0] == Approx(dissipation[1]).epsilon(0.17));
 }
 
-TEST_CASE("the work of an array of spheres that turn is dissipated around them, and their torque is the exact one",
-          "[coupling][energy]") {
+TEST_CASE("the work of an array of spheres that turn is dissipated around them, and their torque is the exact one", "[coupling][energy]") {
   // Spheres of a simple cubic array that turn alike, with no mean vorticity: 8 pi mu a^3 Omega / (1 - phi) at the solid
   // fraction phi, up to the power 10/3 of phi (Zuzovsky, Adler and Brenner, Phys. Fluids 26, 1983), which is 0.1 % here.
   constexpr double rate = 1e-3, radius = 5, side = 16;
@@ -189,8 +187,9 @@ TEST_CASE("the work of an array of spheres that turn is dissipated around them, 
     dissipation.push_back(outcome.last_dissipation_nW / (exact * rate));
     CHECK(outcome.totals.on_bodies < 0);
   }
-  INFO(fmt::format("at 12 and 24 nodes a diameter: imbalance {:.4f}, {:.4f}; torque {:.4f}, {:.4f} and dissipation {:.4f}, {:.4f} of the exact ones",
-                   imbalance[0], imbalance[1], torque[0], torque[1], dissipation[0], dissipation[1]));
+  INFO(fmt::format(
+      "at 12 and 24 nodes a diameter: imbalance {:.4f}, {:.4f}; torque {:.4f}, {:.4f} and dissipation {:.4f}, {:.4f} of the exact ones",
+      imbalance[0], imbalance[1], torque[0], torque[1], dissipation[0], dissipation[1]));
   CHECK(torque[0] == Approx(1).margin(0.14));  // second order: measured 13 and 7.5 % low at 12 and 16 nodes a diameter
   CHECK(torque[1] == Approx(1).margin(0.05));
   CHECK(dissipation[0] == Approx(1).margin(0.04));  // 2.8 and 2.3 % low
@@ -220,8 +219,8 @@ TEST_CASE("the energy of a cell in a tube balances, the better the shorter the s
     scene.cells[0].membrane_viscosity_N_s_per_m = 5.8e-9;
     outcomes.push_back(run(scene));
   }
-  INFO(fmt::format("imbalance {:.4f} at 1 us, {:.4f} at 0.5 us; between fluid and cell {:.4f} and {:.4f}",
-                   outcomes[0].imbalance, outcomes[1].imbalance, outcomes[0].coupling, outcomes[1].coupling));
+  INFO(fmt::format("imbalance {:.4f} at 1 us, {:.4f} at 0.5 us; between fluid and cell {:.4f} and {:.4f}", outcomes[0].imbalance,
+                   outcomes[1].imbalance, outcomes[0].coupling, outcomes[1].coupling));
   // Of it 2.7 and 1.3 % are between fluid and cell; the rest is friction that the fluid misses in the cells that the surface
   // cuts, 1 % on this grid with 1.7 spacings beside the cell.
   CHECK(outcomes[0].imbalance < 0.045);

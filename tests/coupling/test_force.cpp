@@ -5,8 +5,8 @@
 #include <catch2/catch.hpp>
 #include <numeric>
 
-#include "core/error.hpp"
 #include "capsule.hpp"
+#include "core/error.hpp"
 #include "coupling/energy_balance.hpp"
 #include "fluid/flow_balances.hpp"
 #include "immersed/surface_geometry.hpp"
@@ -44,7 +44,7 @@ Case sheared_cell(double step_us, double end_us, bool slip) {
 
 /// On every rank the same.
 struct Run {
-  std::vector<double> x;  // without periodic sides
+  std::vector<double> x;                                                     // without periodic sides
   double area = 0, rest_area = 0, volume = 0, rest_volume = 0, stretch = 0;  // of the one cell
   double imbalance = 0, coupling_imbalance = 0;
 };
@@ -57,8 +57,7 @@ Run run(const Case& scene) {
   const auto measure = [&] {
     std::fill(sums, sums + 6, 0.0);
     for (const auto& cell : simulation.membranes()->diagnostics()) {
-      const double its[6] = {cell.area_um2,       cell.rest_area_um2, cell.volume_um3,
-                             cell.rest_volume_um3, cell.stretch,       cell.energy_fJ()};
+      const double its[6] = {cell.area_um2, cell.rest_area_um2, cell.volume_um3, cell.rest_volume_um3, cell.stretch, cell.energy_fJ()};
       std::copy(its, its + 6, sums);
     }
     simulation.grid().comm().sum(sums, 6);
@@ -68,7 +67,13 @@ Run run(const Case& scene) {
     measure();
     energy.sample(sums[5]);
   }
-  return {positions(simulation), sums[0], sums[1], sums[2], sums[3], sums[4], energy.imbalance().value_or(0),
+  return {positions(simulation),
+          sums[0],
+          sums[1],
+          sums[2],
+          sums[3],
+          sums[4],
+          energy.imbalance().value_or(0),
           energy.coupling_imbalance().value_or(0)};
 }
 
@@ -98,9 +103,8 @@ TEST_CASE("a sheared cell keeps its volume, and the energy balances", "[coupling
   scene.coupling->pressure = s.pressure;
   const Run r = run(scene);
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("volume {:.2e}, area {:.2e}, balance {:.2e}, of the coupling {:.2e}",
-                     r.volume / r.rest_volume - 1, r.area / r.rest_area - 1, r.imbalance,
-                     r.coupling_imbalance));
+    WARN(fmt::format("volume {:.2e}, area {:.2e}, balance {:.2e}, of the coupling {:.2e}", r.volume / r.rest_volume - 1,
+                     r.area / r.rest_area - 1, r.imbalance, r.coupling_imbalance));
   CHECK(r.volume == Approx(r.rest_volume).epsilon(1e-5));
   CHECK(r.area == Approx(r.rest_area).epsilon(0.03));
   CHECK(r.imbalance < 0.02);
@@ -159,10 +163,10 @@ TEST_CASE("steps too long for a membrane are refused, and the longest that is no
 
 TEST_CASE("steps that are not refused are stable where fluids differ and where spacings do", "[coupling][force]") {
   // Meshes that are fine beside the grid relax by slip alone, which is largest where no direction of the grid is along the normal.
-  const auto [ratio, nodes, vertices] = GENERATE(std::tuple{0.1, Triple{17, 17, 17}, 500}, std::tuple{0.2, Triple{17, 17, 17}, 500},
-                                                 std::tuple{0.2, Triple{25, 7, 25}, 500}, std::tuple{5.0, Triple{25, 7, 25}, 500},
-                                                 std::tuple{1.0, Triple{17, 25, 25}, 500}, std::tuple{1.0, Triple{7, 25, 25}, 500},
-                                                 std::tuple{1.0, Triple{21, 21, 21}, 1500});
+  const auto [ratio, nodes, vertices] =
+      GENERATE(std::tuple{0.1, Triple{17, 17, 17}, 500}, std::tuple{0.2, Triple{17, 17, 17}, 500}, std::tuple{0.2, Triple{25, 7, 25}, 500},
+               std::tuple{5.0, Triple{25, 7, 25}, 500}, std::tuple{1.0, Triple{17, 25, 25}, 500}, std::tuple{1.0, Triple{7, 25, 25}, 500},
+               std::tuple{1.0, Triple{21, 21, 21}, 1500});
   ShearedCapsule capsule;
   capsule.viscosity_ratio = ratio, capsule.vertices = vertices;
   Case scene = capsule.scene(1);
@@ -177,7 +181,9 @@ TEST_CASE("steps that are not refused are stable where fluids differ and where s
   for (const double share : {0.59, 0.95}) {  // of second and of first order
     scene.time = {share * longest, share * longest * 80};
     const Run r = run(scene);
-    if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("ratio {} on {:g} {:g} {:g}: {:.3g} us, stretch {}", ratio, nodes[0], nodes[1], nodes[2], share * longest, r.stretch));
+    if (std::getenv("CORPUSCLE_SHOW"))
+      WARN(fmt::format("ratio {} on {:g} {:g} {:g}: {:.3g} us, stretch {}", ratio, nodes[0], nodes[1], nodes[2], share * longest,
+                       r.stretch));
     CHECK(r.stretch < 1.025);
   }
 }
@@ -208,9 +214,9 @@ TEST_CASE("a refusal tells the step that is taken then, and which cell asks for 
 }
 
 TEST_CASE("steps that are not refused are stable without slip, in bends, and with stiff viscous membranes", "[coupling][force]") {
-  // Drawn out by 5 % at rest, spheres go back; what swings grows. Second order is sound up to 0.45 of the limit without slip (it broke down at
-  // 0.59), the cell inside a bend is in the narrowest spacings (230 us were told where it stands 81) and that outside slips most, and of what
-  // membrane viscosity lends little is left to a membrane that is stiff to bend (of 7700 us some 200).
+  // Drawn out by 5 % at rest, spheres go back; what swings grows. Second order is sound up to 0.45 of the limit without slip (it broke down
+  // at 0.59), the cell inside a bend is in the narrowest spacings (230 us were told where it stands 81) and that outside slips most, and of
+  // what membrane viscosity lends little is left to a membrane that is stiff to bend (of 7700 us some 200).
   const auto sphere_at = [](const Triple& center, double modulus, double bending, double viscosity) {
     CellSettings cell;
     cell.shape = CellSettings::Shape::sphere;
@@ -261,7 +267,8 @@ TEST_CASE("steps that are not refused are stable without slip, in bends, and wit
       simulation.step();
       if (simulation.steps() == 50) half = energy();
     }
-    if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{}: {:.3g} us, energies {:.3g} {:.3g} {:.3g}", which, share * longest, first, half, energy()));
+    if (std::getenv("CORPUSCLE_SHOW"))
+      WARN(fmt::format("{}: {:.3g} us, energies {:.3g} {:.3g} {:.3g}", which, share * longest, first, half, energy()));
     CHECK(half < (which < 2 ? 0.5 : 1.0) * first);  // with slip steps are short, and that viscous it takes longer
     CHECK(energy() < 1.02 * half);
   }
@@ -304,7 +311,7 @@ TEST_CASE("the longest step is that of the stiffest kind of cell, in whatever or
     INFO(one << ", " << other << " us, together " << both);
     CHECK(std::abs(one / other - 1) > 0.1);
     CHECK(both == Approx(std::min(one, other)).epsilon(0.03));  // with viscosity it goes by the softest deformation of all cells
-    CHECK(longest({b, a}) == Approx(both).epsilon(0.006));  // of three digits
+    CHECK(longest({b, a}) == Approx(both).epsilon(0.006));      // of three digits
   }
 }
 
@@ -403,8 +410,10 @@ TEST_CASE("what a membrane that hardly deforms takes from a flow hardly depends 
     while (!simulation.done()) simulation.step();
     return mean_velocity(simulation.fluid())[0];
   };
-  const double plasma = flow({}), one = plasma / flow(1) - 1, four = plasma / flow(4) - 1, five = plasma / flow(5) - 1, twenty = plasma / flow(20) - 1;
-  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("added: {:.5f}; {:.3f}, {:.3f}, {:.3f} times that", one, four / one, five / one, twenty / one));
+  const double plasma = flow({}), one = plasma / flow(1) - 1, four = plasma / flow(4) - 1, five = plasma / flow(5) - 1,
+               twenty = plasma / flow(20) - 1;
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("added: {:.5f}; {:.3f}, {:.3f}, {:.3f} times that", one, four / one, five / one, twenty / one));
   CHECK(one > 0.01);
   CHECK(four / one == Approx(1).margin(0.1));  // 1.075, 1.092
   CHECK(five / one == Approx(1).margin(0.12));
@@ -429,8 +438,9 @@ TEST_CASE("the pressure of a cell of fifty times the viscosity between near wall
     energy.sample(simulation.membranes()->diagnostics()[0].energy_fJ());
   }
   CHECK(simulation.fluid().splitting() < 0.05);
-  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("speed {}, ratio {}: {:.3f} of the energy, splitting {:.3f}", speed,
-                                                     scene.cells[0].viscosity_ratio, energy.imbalance().value_or(0), simulation.fluid().splitting()));
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("speed {}, ratio {}: {:.3f} of the energy, splitting {:.3f}", speed, scene.cells[0].viscosity_ratio,
+                     energy.imbalance().value_or(0), simulation.fluid().splitting()));
   if (speed > 0) CHECK(*energy.imbalance() < 0.1);  // of so coarse a grid: 0.05 however long the pressure is repeated
 }
 

@@ -85,9 +85,9 @@ TEST_CASE("a cell that is pushed onto a body comes to rest before it", "[couplin
     if (!show() || simulation.steps() % 10 > 0) continue;
     const auto load = simulation.coupling()->contact_load(0, 20);
     const double balance = simulation.immersed()->balance_forces()[0][0];
-    WARN(fmt::format("{} us: gap {:.3f} um, on the body {:.5f} + {:.5f} nN, {:.2e} um/us, energy {:.3e}, coupling {:.3e}", simulation.time(),
-                     simulation.coupling()->contact_report()->smallest_body_gap, load[0], balance, largest_speed(simulation),
-                     energy.imbalance().value_or(-1), energy.coupling_imbalance().value_or(-1)));
+    WARN(fmt::format("{} us: gap {:.3f} um, on the body {:.5f} + {:.5f} nN, {:.2e} um/us, energy {:.3e}, coupling {:.3e}",
+                     simulation.time(), simulation.coupling()->contact_report()->smallest_body_gap, load[0], balance,
+                     largest_speed(simulation), energy.imbalance().value_or(-1), energy.coupling_imbalance().value_or(-1)));
   }
   const ContactReport contact = *simulation.coupling()->contact_report();
   CHECK(contact.crossings == 0);
@@ -120,11 +120,11 @@ TEST_CASE("cells that begin in a body, or around one, are refused", "[coupling][
     INFO(text);
     for (const char* part : {"cells.0", "bodies.0", "center_um"}) CHECK(text.find(part) != std::string::npos);
   };
-  named(refused({1, 0, 0}, 2.5, {0, 0, 0}));           // all of it
-  named(refused({-3, 0, 0}, 2.5, {0, 0, 0}));          // a part
-  named(refused({-3.9, 0.2, 0.1}, 2.5, {0, 0, 0}));    // by 0.1 um
-  named(refused({5.2, 0, 0}, 2.5, {-4.5, 0, 0}));      // beyond a periodic side
-  named(refused({0.1, 0, 0}, 1.3, {0, 0, 0}));         // the body in the cell
+  named(refused({1, 0, 0}, 2.5, {0, 0, 0}));         // all of it
+  named(refused({-3, 0, 0}, 2.5, {0, 0, 0}));        // a part
+  named(refused({-3.9, 0.2, 0.1}, 2.5, {0, 0, 0}));  // by 0.1 um
+  named(refused({5.2, 0, 0}, 2.5, {-4.5, 0, 0}));    // beyond a periodic side
+  named(refused({0.1, 0, 0}, 1.3, {0, 0, 0}));       // the body in the cell
   CHECK(refused({-4.3, 0, 0}, 2.5, {0, 0, 0}) == "accepted");
 }
 
@@ -152,8 +152,8 @@ TEST_CASE("bodies that move push cells on, through periodic sides, and the energ
     if (!show() || simulation.steps() % 10 > 0) continue;
     const auto load = simulation.coupling()->contact_load(1, 20);
     WARN(fmt::format("{} us: gap {:.3f} um, on the body {:.4f} nN {:.5f} nW, energy {:.3e}, coupling {:.3e}", simulation.time(),
-                     simulation.coupling()->contact_report()->smallest_body_gap, load[1], load[3],
-                     energy.imbalance().value_or(-1), energy.coupling_imbalance().value_or(-1)));
+                     simulation.coupling()->contact_report()->smallest_body_gap, load[1], load[3], energy.imbalance().value_or(-1),
+                     energy.coupling_imbalance().value_or(-1)));
   }
   const ContactReport contact = *simulation.coupling()->contact_report();
   CHECK(contact.crossings == 0);

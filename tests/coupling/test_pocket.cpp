@@ -17,8 +17,7 @@ TriangleMesh turned(const Profile& corner) {
   for (std::size_t n = 1; n < corner.size(); ++n) {
     const auto &a = corner[n - 1], &b = corner[n];
     const int pieces = std::max(1, static_cast<int>(std::ceil(std::hypot(b[0] - a[0], b[1] - a[1]))));
-    for (int i = 1; i <= pieces; ++i)
-      profile.push_back({a[0] + (b[0] - a[0]) * i / pieces, a[1] + (b[1] - a[1]) * i / pieces});
+    for (int i = 1; i <= pieces; ++i) profile.push_back({a[0] + (b[0] - a[0]) * i / pieces, a[1] + (b[1] - a[1]) * i / pieces});
   }
   TriangleMesh mesh;
   std::vector<std::array<int, around>> rings;
@@ -77,8 +76,8 @@ TEST_CASE("fluid that a body closes in is found on any number of ranks, and its 
   in.viscosity = 1;
   const auto kind = fluid.kind();
   const auto p = in.p;
-  Kokkos::parallel_for("corpuscle::test::fill", Policy(0, grid.index().size()),
-                       KOKKOS_LAMBDA(int c) { p(c) = kind(c) == NodeKind::fluid ? 1 : -7; });
+  Kokkos::parallel_for(
+      "corpuscle::test::fill", Policy(0, grid.index().size()), KOKKOS_LAMBDA(int c) { p(c) = kind(c) == NodeKind::fluid ? 1 : -7; });
   boundary.extend_pressure(in.p);
   grid.halo().exchange(in.p);
   const auto stress = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), boundary.find_stress(in).values);

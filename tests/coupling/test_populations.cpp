@@ -165,7 +165,8 @@ TEST_CASE("a restart does not pack again", "[coupling][populations][ranks]") {
   FlowSimulation next(Comm(), scene, timers, &packed);
   read_checkpoint(file.path(), next, "", "");
   CHECK(largest_difference(finish(next).x, whole.x) == 0);
-  if (tight) {  // stiffer membranes need shorter steps, viscous ones once they are stiff indeed, also of cells that are small until the checkpoint is read
+  if (tight) {  // stiffer membranes need shorter steps, viscous ones once they are stiff indeed, also of cells that are small until the
+                // checkpoint is read
     Case stiff = scene;
     stiff.cell_types[0].cell.shear_modulus_uN_per_m *= 20000;
     FlowSimulation refused(Comm(), stiff, timers, &packed);

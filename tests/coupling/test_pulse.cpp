@@ -51,8 +51,8 @@ TEST_CASE("the force on a held sphere follows a pulse, whatever the step", "[cou
   once_a_step.fluid->repeat_projection = false;
   const Course once = run(once_a_step);
   INFO("4 and 8 us after the pulse, nN: steps of 0.5 us " << reference.after_4us << ", " << reference.after_8us << "; of 4 us "
-       << long_steps.after_4us << ", " << long_steps.after_8us << "; with one projection each " << once.after_4us << ", "
-       << once.after_8us);
+                                                          << long_steps.after_4us << ", " << long_steps.after_8us
+                                                          << "; with one projection each " << once.after_4us << ", " << once.after_8us);
   // Measured 0.8 and 0.5 % from the step itself; one projection a step leaves the force 49 and 44 % low.
   CHECK(long_steps.after_4us == Approx(reference.after_4us).epsilon(0.01));
   CHECK(long_steps.after_8us == Approx(reference.after_8us).epsilon(0.01));

@@ -65,9 +65,8 @@ TEST_CASE("a rigid body keeps its shape and moves at the velocity it tells the f
 }
 
 TEST_CASE("a body's growth is the rate of its volume", "[coupling]") {
-  const SurfaceSet surface =
-      make_surface_set({make_body_mesh(ellipsoid({2, 1.2, 0.7}, {0.3, -0.2, 0.1}), 0.5),
-                        make_body_mesh(ellipsoid({1, 1, 1}, {6, 0, 0}), 0.5)});
+  const SurfaceSet surface = make_surface_set(
+      {make_body_mesh(ellipsoid({2, 1.2, 0.7}, {0.3, -0.2, 0.1}), 0.5), make_body_mesh(ellipsoid({1, 1, 1}, {6, 0, 0}), 0.5)});
   const auto field = KOKKOS_LAMBDA(const Vec3& x) {
     return Vec3{0.3 + 0.4 * x.x + 0.1 * std::sin(x.y), -0.2 * x.y + 0.1 * x.x * x.z, 0.1 * x.z + 0.05 * x.x * x.x};
   };
@@ -88,7 +87,10 @@ TEST_CASE("a body's growth is the rate of its volume", "[coupling]") {
   predict_positions(surface, surface.vertices, dt);
 
   // A velocity that is linear in space: the mean over a surface symmetric about its centre is that at the centre.
-  set_velocity(surface, KOKKOS_LAMBDA(const Vec3& x) { return Vec3{0.3 + 0.4 * x.x, 0.2 * x.z, -1.0}; });
+  set_velocity(
+      surface, KOKKOS_LAMBDA(const Vec3& x) {
+        return Vec3{0.3 + 0.4 * x.x, 0.2 * x.z, -1.0};
+      });
   body_growth(surface, growth, mean);
   const auto average = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), mean);
   CHECK(average(0, 0) == Approx(0.3 + 0.4 * 0.3).margin(0.01));  // the mesh of 300 vertices is symmetric to a per cent
@@ -100,9 +102,10 @@ TEST_CASE("the surface part of the dissipation is exact for flows linear in spac
   const SurfaceSet surface = make_surface_set({make_body_mesh(ellipsoid({2, 1.2, 0.7}, {0.3, -0.2, 0.1}), 0.5)});
   // u = A x + c without divergence: by Gauss's theorem the integral of (u . grad) u . n is the trace of A^2 times the
   // volume; of the polyhedron too, whose triangles carry u exactly.
-  set_velocity(surface, KOKKOS_LAMBDA(const Vec3& x) {
-    return Vec3{0.3 * x.x + 0.5 * x.y + 1, 0.7 * x.x + 0.1 * x.y - 0.4 * x.z, 0.6 * x.y - 0.4 * x.z - 2};
-  });
+  set_velocity(
+      surface, KOKKOS_LAMBDA(const Vec3& x) {
+        return Vec3{0.3 * x.x + 0.5 * x.y + 1, 0.7 * x.x + 0.1 * x.y - 0.4 * x.z, 0.6 * x.y - 0.4 * x.z - 2};
+      });
   const double trace = 0.3 * 0.3 + 0.1 * 0.1 + 0.4 * 0.4 + 2 * (0.5 * 0.7) - 2 * (0.4 * 0.6);
   CHECK(surface_gradient_work(surface) == Approx(trace * enclosed_volume(surface)).epsilon(1e-11));
 }

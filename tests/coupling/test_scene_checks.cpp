@@ -118,7 +118,8 @@ TEST_CASE("changes of the inflow that no step sees are refused") {
   CHECK(found({{0, 0}, {3, 0}, {3.001, 1}, {100, 1}}) == "accepted");
   CHECK(found({{0, 0}, {5, 0.5}, {10, 1}, {15, 0.5}, {20, 0}}) == "accepted");
   CHECK(found({{0, 0}, {10, 1}, {30, 1}, {30.1, 9}, {30.2, 1}}) == "accepted");
-  CHECK_THAT(found({{0, 0}, {1e-5, 0.5}, {2e-5, 1}}), Contains("boundary.4.time_table") && Contains("within the first step") && Contains("1e6"));
+  CHECK_THAT(found({{0, 0}, {1e-5, 0.5}, {2e-5, 1}}),
+             Contains("boundary.4.time_table") && Contains("within the first step") && Contains("1e6"));
 }
 
 TEST_CASE("a pressure gradient must point along the periodic sides' shift") {
@@ -136,8 +137,8 @@ TEST_CASE("a moving wall must not move through itself", "[ranks]") {
   lid[5].velocity = Triple{2e-3, -1e-3, 0};
   CHECK(refusal(lid) == "accepted");
   lid[5].velocity = Triple{2e-3, 0, 1e-6};
-  CHECK_THAT(refusal(lid), Contains("boundary.5.velocity_mm_per_s") && Contains("k_max") && Contains("0.001 mm/s") &&
-                               Contains("velocity_inlet"));
+  CHECK_THAT(refusal(lid),
+             Contains("boundary.5.velocity_mm_per_s") && Contains("k_max") && Contains("0.001 mm/s") && Contains("velocity_inlet"));
   lid[0].type = Type::outflow;  // which does not make it one that fluid goes through
   CHECK_THAT(refusal(lid), Contains("must not move through itself"));
 }
@@ -157,7 +158,8 @@ TEST_CASE("walls that would tear a cell in a step are refused, and fast ones war
   CHECK_THAT(strain(10.1), !Contains("InputError: ") && Contains("boundary.4.velocity_mm_per_s = [-300, 0, 0]") && Contains("12 um away") &&
                                Contains("600 mm/s") && Contains("by 0.505 in a step of 10.1 us") && Contains("time.step_us to 9.8 us"));
   CHECK(strain(1.98, true).empty());
-  CHECK_THAT(strain(2.02, true), Contains("by 0.101 in a step of 2.02 us") && Contains("0.1 is the most that a cell whose membrane is viscous follows well"));
+  CHECK_THAT(strain(2.02, true),
+             Contains("by 0.101 in a step of 2.02 us") && Contains("0.1 is the most that a cell whose membrane is viscous follows well"));
   CHECK_THAT(strain(39.9), !Contains("InputError: ") && Contains("strains"));
   CHECK_THAT(strain(40.1), Contains("InputError: boundary.4.velocity_mm_per_s"));
   sides[5].velocity = sides[4].velocity;  // the fluid between goes with them

@@ -148,8 +148,7 @@ TEST_CASE("cells cross ranks and periodic sides, and nothing shows that they do"
   CHECK(shared.moves > 2 * Comm().size());
   if (Comm().size() == 1 || !Comm().root()) return;
   const Outcome one = run(Comm::alone(), scene);
-  if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("differ by {:.2e} um, {} moves", largest_difference(one.x, shared.x), shared.moves));
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("differ by {:.2e} um, {} moves", largest_difference(one.x, shared.x), shared.moves));
   CHECK(one.laps == shared.laps);
   CHECK(largest_difference(one.x, shared.x) < 1e-8);  // um; round-off, and residuals of the solvers at 1e-13
 }
@@ -232,7 +231,8 @@ TEST_CASE("in a tube slip is held where strain stiffens, on any number of ranks 
   CHECK(margin >= 1);
   CHECK(margin < 1.5);
   while (!simulation.done()) simulation.step();
-  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("margin {:.3f}, differ by {:.2e} um", margin, largest_difference(outcome(simulation).x, shared.x)));
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("margin {:.3f}, differ by {:.2e} um", margin, largest_difference(outcome(simulation).x, shared.x)));
   CHECK(largest_difference(outcome(simulation).x, shared.x) < 1e-8);  // um; round-off, and residuals of the solvers at 1e-13
 }
 

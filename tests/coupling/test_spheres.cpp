@@ -15,10 +15,10 @@ const double pi = std::acos(-1.0);
 /// Flow 8, 1982), which up to a solid fraction of 0.216 gives the values of Zick and Homsy (J. Fluid Mech. 115, 1982) to
 /// 2e-4: 2.810 at 0.064, 7.442 at 0.216.
 double exact_array_drag(double fraction) {
-  constexpr double coefficient[] = {1,         1.418649,  2.012564,  2.331523,   2.564809,  2.584787,  2.873609,  3.340163,
-                                    3.536763,  3.504092,  3.253622,  2.689757,   2.037769,  1.809341,  1.877347,  1.534685,
-                                    0.9034708, 0.2857896, -0.5512626, -1.278724, 1.013350,  5.492491,  4.615388,  -0.5736023,
-                                    -2.865924, -4.709215, -6.870076, 0.1455304,  12.51891,  9.742811,  -5.566269};
+  constexpr double coefficient[] = {1,         1.418649,  2.012564,   2.331523,  2.564809, 2.584787, 2.873609, 3.340163,
+                                    3.536763,  3.504092,  3.253622,   2.689757,  2.037769, 1.809341, 1.877347, 1.534685,
+                                    0.9034708, 0.2857896, -0.5512626, -1.278724, 1.013350, 5.492491, 4.615388, -0.5736023,
+                                    -2.865924, -4.709215, -6.870076,  0.1455304, 12.51891, 9.742811, -5.566269};
   const double x = std::cbrt(fraction / (pi / 6));
   double sum = 0, power = 1;
   for (double c : coefficient) sum += c * power, power *= x;
@@ -26,7 +26,7 @@ double exact_array_drag(double fraction) {
 }
 
 struct ArrayForce {
-  double mean_flow = 0;  // drag over 6 pi mu a U with the force that is exact here and the computed mean velocity U
+  double mean_flow = 0;                     // drag over 6 pi mu a U with the force that is exact here and the computed mean velocity U
   double by_balance = 0, by_tractions = 0;  // force over the exact one
   double across = 0;                        // the largest part of either across the flow
 };
@@ -51,17 +51,18 @@ ArrayForce array_force(double fraction, int nodes_per_diameter) {
   const Triple balance = simulation.immersed()->balance_forces()[0];
   const double exact = 1e-3 * side * side * side;
   const double across = std::max({std::hypot(tractions[0], tractions[1]), std::hypot(balance[0], balance[1])});
-  return {exact / (6 * pi * simulation.fluid().viscosity() * radius * mean_velocity(simulation.fluid())[2]),
-          balance[2] / exact, tractions[2] / exact, across / exact};
+  return {exact / (6 * pi * simulation.fluid().viscosity() * radius * mean_velocity(simulation.fluid())[2]), balance[2] / exact,
+          tractions[2] / exact, across / exact};
 }
 
 }  // namespace
 
 TEST_CASE("the flow through arrays of spheres, and the force on them, converge to the exact ones", "[coupling]") {
   const auto show = [](double fraction, int nodes, const ArrayForce& f) {
-    UNSCOPED_INFO(fmt::format("fraction {}, {} nodes a diameter: drag {:.4f} of the exact one; force by the balance {:.6f}, by "
-                              "tractions {:.4f}, across {:.1e}",
-                              fraction, nodes, f.mean_flow / exact_array_drag(fraction), f.by_balance, f.by_tractions, f.across));
+    UNSCOPED_INFO(
+        fmt::format("fraction {}, {} nodes a diameter: drag {:.4f} of the exact one; force by the balance {:.6f}, by "
+                    "tractions {:.4f}, across {:.1e}",
+                    fraction, nodes, f.mean_flow / exact_array_drag(fraction), f.by_balance, f.by_tractions, f.across));
   };
   const ArrayForce coarse = array_force(0.216, 12), fine = array_force(0.216, 24), dilute = array_force(0.064, 12);
   show(0.216, 12, coarse), show(0.216, 24, fine), show(0.064, 12, dilute);
@@ -145,8 +146,8 @@ TEST_CASE("two spheres in a box act on each other reciprocally", "[coupling]") {
   const Vec3 on_second = force_on_other(0, 0);
   Vec3 on_first;
   for (int direction = 0; direction < 3; ++direction) on_first[direction] = force_on_other(1, direction).x;
-  INFO(fmt::format("({:.3f}, {:.3f}, {:.3f}) and ({:.3f}, {:.3f}, {:.3f}) nN us/um", on_second.x, on_second.y, on_second.z,
-                   on_first.x, on_first.y, on_first.z));
+  INFO(fmt::format("({:.3f}, {:.3f}, {:.3f}) and ({:.3f}, {:.3f}, {:.3f}) nN us/um", on_second.x, on_second.y, on_second.z, on_first.x,
+                   on_first.y, on_first.z));
   CHECK(norm(on_second) > 10);
   CHECK(norm(on_second - on_first) < 0.05 * norm(on_second));  // 8 and 6 nodes a diameter
 }
@@ -173,8 +174,7 @@ TEST_CASE("a sphere carried through the grid feels a smooth force", "[coupling]"
   while (!simulation.done()) {
     simulation.step();
     simulation.immersed()->tractions();
-    if (simulation.steps() > warm)
-      force.push_back(simulation.immersed()->loads({simulation.rigid_bodies()->centre(0)})[0][0][2]);
+    if (simulation.steps() > warm) force.push_back(simulation.immersed()->loads({simulation.rigid_bodies()->centre(0)})[0][0][2]);
   }
   double mean = 0, square = 0;
   for (double f : force) mean += f / force.size();

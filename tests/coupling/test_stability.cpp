@@ -106,10 +106,13 @@ TEST_CASE("a coupling below the added mass of the fluid is refused, or stopped w
   // setting to change. With half as much again it is sound.
   Case edge = tube(1, 0.1, 60);
   edge.coupling->robin_coefficient = 18.5;
-  CHECK_THROWS_MATCHES(run(edge), ComputationError, Catch::Matchers::Predicate<ComputationError>([](const auto& error) {
-    const std::string text = error.what();
-    return text.find("swung to and fro") != text.npos && text.find("coupling.robin_coefficient") != text.npos;
-  }, "names the swing and the setting"));
+  CHECK_THROWS_MATCHES(run(edge), ComputationError,
+                       Catch::Matchers::Predicate<ComputationError>(
+                           [](const auto& error) {
+                             const std::string text = error.what();
+                             return text.find("swung to and fro") != text.npos && text.find("coupling.robin_coefficient") != text.npos;
+                           },
+                           "names the swing and the setting"));
   edge.coupling->robin_coefficient = 28;
   require_sound(edge);
 }
@@ -142,10 +145,13 @@ TEST_CASE("cells too close to each other are refused, and stopped when they come
   };
   CHECK_THROWS_AS(run(followed_at(3, 1)), InputError);
   // 1.3 spacings between the rims: a plane of nodes between the two cells, all of them beside one or the other.
-  CHECK_THROWS_MATCHES(run(followed_at(5, 1)), InputError, Catch::Matchers::Predicate<InputError>([](const auto& error) {
-    const std::string text = error.what();
-    return text.find("film between bodies: cells.") != text.npos && text.find("grid.nodes") != text.npos;
-  }, "names the film"));
+  CHECK_THROWS_MATCHES(run(followed_at(5, 1)), InputError,
+                       Catch::Matchers::Predicate<InputError>(
+                           [](const auto& error) {
+                             const std::string text = error.what();
+                             return text.find("film between bodies: cells.") != text.npos && text.find("grid.nodes") != text.npos;
+                           },
+                           "names the film"));
   require_sound(followed_at(10, 10));
 }
 
@@ -179,11 +185,11 @@ TEST_CASE("a body held in a flow of large nu dt / h^2 feels a steady force", "[c
     const auto force = simulation.immersed()->loads({scene.bodies[0].center_um})[0][0];
     if (speed.size() > 50) {
       INFO("step " << speed.size());
-      CHECK(force[2] == Approx(1e-3 * std::pow(16.12, 3)).epsilon(0.08));  // the imposed gradient times the volume; tractions are 5 % low at 16 nodes a diameter
+      CHECK(force[2] == Approx(1e-3 * std::pow(16.12, 3))
+                            .epsilon(0.08));  // the imposed gradient times the volume; tractions are 5 % low at 16 nodes a diameter
     }
   }
-  for (std::size_t n = speed.size() - 10; n + 1 < speed.size(); ++n)
-    CHECK(speed[n] == Approx(speed[n + 1]).epsilon(1e-5));
+  for (std::size_t n = speed.size() - 10; n + 1 < speed.size(); ++n) CHECK(speed[n] == Approx(speed[n + 1]).epsilon(1e-5));
 }
 
 }  // namespace corpuscle

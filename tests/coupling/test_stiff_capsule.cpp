@@ -69,6 +69,6 @@ TEST_CASE("steps as long as viscous membranes are said to stand are stable", "[c
   constexpr int steps = 80;
   const double longest = deformed(0.95 * stands, steps), half = deformed(0.475 * stands, 2 * steps);
   INFO(fmt::format("ratio {}, {}: stands {:.3g} us, D {:.4f}, with half of it {:.4f}", ratio, viscosity, stands, longest, half));
-  CHECK(half > 0.005);  // 25/12 of the capillary number is 0.0104
+  CHECK(half > 0.005);                           // 25/12 of the capillary number is 0.0104
   CHECK(longest == Approx(half).epsilon(0.03));  // 1 % apart; what swings was off by 10 % and more, or tore
 }

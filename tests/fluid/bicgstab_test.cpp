@@ -26,8 +26,7 @@ void apply_transport(double shift, double skew, const Array<double>& x, const Ar
 
 void set_wave(const Array<double>& x) {
   Kokkos::parallel_for(
-      "corpuscle::test::wave", Policy(0, static_cast<int>(x.extent(0))),
-      KOKKOS_LAMBDA(int i) { x(i) = std::sin(0.3 * i) + 0.1 * i; });
+      "corpuscle::test::wave", Policy(0, static_cast<int>(x.extent(0))), KOKKOS_LAMBDA(int i) { x(i) = std::sin(0.3 * i) + 0.1 * i; });
 }
 
 double distance(const Array<double>& a, const Array<double>& b) {

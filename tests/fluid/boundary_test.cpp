@@ -29,9 +29,7 @@ struct Filled {
   BoundaryConditions conditions;
   Components<double> u;
   Filled(const GridSettings& shape, const std::vector<BoundarySettings>& sides, const std::array<bool, 3>& periodic)
-      : grid(Comm(), make_node_source(shape), periodic),
-        conditions(grid, sides, &shape),
-        u("corpuscle::test::u", grid.index().size(), 3) {}
+      : grid(Comm(), make_node_source(shape), periodic), conditions(grid, sides, &shape), u("corpuscle::test::u", grid.index().size(), 3) {}
   void fill(double t) {
     conditions.set_time(t);
     grid.halo().exchange(u);
@@ -164,8 +162,7 @@ TEST_CASE("ramps and tables in time multiply the profile", "[fluid]") {
 }
 
 TEST_CASE("each kind of side fills the boundary as it should", "[fluid]") {
-  auto all =
-      sides({Type::symmetry, Type::wall, Type::moving_wall, Type::symmetry, Type::velocity_inlet, Type::outflow});
+  auto all = sides({Type::symmetry, Type::wall, Type::moving_wall, Type::symmetry, Type::velocity_inlet, Type::outflow});
   all[2].velocity = Triple{0.5, 0, -0.25};
   all[4].velocity = Triple{0.1, 0.2, 0.7};
   Filled scene(box({4, 5, 6}, {2, 2, 3}), all, open);

@@ -11,8 +11,7 @@ using Convection = FluidSettings::Convection;
 
 namespace {
 
-constexpr auto periodic_between_walls =
-    std::array{Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic};
+constexpr auto periodic_between_walls = std::array{Type::periodic, Type::periodic, Type::wall, Type::wall, Type::periodic, Type::periodic};
 
 void run(FluidSolver& solver, double dt, int steps) {
   for (int n = 1; n <= steps; ++n) {
@@ -45,8 +44,7 @@ void set_uniform(FluidSolver& solver, const Vec3& speed, double step_us) {
     for (const auto& flux : {state.flux[d], state.flux_old[d]}) {
       if (!flux.data()) continue;
       Kokkos::parallel_for(
-          "corpuscle::test::uniform_flux", Policy(0, grid.index.size()),
-          KOKKOS_LAMBDA(int c) { flux(c) = dot(load(area, c), speed); });
+          "corpuscle::test::uniform_flux", Policy(0, grid.index.size()), KOKKOS_LAMBDA(int c) { flux(c) = dot(load(area, c), speed); });
     }
   }
   state.history_levels = 1;
@@ -84,13 +82,8 @@ TEST_CASE("plane Poiseuille flow converges at second order", "[fluid]") {
     Grid grid(Comm(), make_node_source(shape), {true, false, true});
     FluidSolver solver(grid, settings, sides(periodic_between_walls), &shape);
     run(solver, 50, 30);
-    error[level] = largest_error(solver,
-                                 [&](const Triple& x) {
-                                   return Triple{0, 0, centre * 4 * x[1] / 10 * (1 - x[1] / 10)};
-                                 }) /
-                   centre;
-    CHECK(error[level] <
-          1.01 / std::pow(8 << level, 2));  // half-cells at the walls shift the parabola by h^2 / (4 H^2) x 4
+    error[level] = largest_error(solver, [&](const Triple& x) { return Triple{0, 0, centre * 4 * x[1] / 10 * (1 - x[1] / 10)}; }) / centre;
+    CHECK(error[level] < 1.01 / std::pow(8 << level, 2));  // half-cells at the walls shift the parabola by h^2 / (4 H^2) x 4
   }
   CHECK(std::log2(error[0] / error[1]) > 1.95);
   CHECK(std::log2(error[1] / error[2]) > 1.95);
@@ -161,8 +154,7 @@ TEST_CASE("a periodic box without any pressure level is solved", "[fluid]") {
   settings.kinematic_viscosity_um2_per_us = 0.05;
   const double pi = std::acos(-1.0), dt = 0.02;
   constexpr int steps = 10;
-  const auto all =
-      sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
+  const auto all = sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
   double error[3];
   for (int level = 0; level < 3; ++level) {
     const int n = 10 << level;
@@ -171,13 +163,10 @@ TEST_CASE("a periodic box without any pressure level is solved", "[fluid]") {
     FluidSolver solver(grid, settings, all, &shape);
     auto state = solver.state();
     const auto views = grid.views();
-    const auto flow = KOKKOS_LAMBDA(const Vec3& x) {
-      return Vec3{std::sin(x.x) * std::cos(x.y), -std::cos(x.x) * std::sin(x.y), 0};
-    };
+    const auto flow = KOKKOS_LAMBDA(const Vec3& x) { return Vec3{std::sin(x.x) * std::cos(x.y), -std::cos(x.x) * std::sin(x.y), 0}; };
     const auto x = views.x;
     Kokkos::parallel_for(
-        "corpuscle::test::vortices", Policy(0, views.index.size()),
-        KOKKOS_LAMBDA(int c) { store(state.u, c, flow(load(x, c))); });
+        "corpuscle::test::vortices", Policy(0, views.index.size()), KOKKOS_LAMBDA(int c) { store(state.u, c, flow(load(x, c))); });
     for (int d = 0; d < 3; ++d) {
       const auto area = views.face_area[d];
       const auto flux = state.flux[d];
@@ -204,8 +193,7 @@ TEST_CASE("a periodic box without any pressure level is solved", "[fluid]") {
 TEST_CASE("uniform flow between symmetry sides stays uniform", "[fluid][ranks]") {
   FluidSettings settings;
   const GridSettings shape = box({7, 6, 10}, {10, 10, 20});
-  auto all =
-      sides({Type::symmetry, Type::symmetry, Type::symmetry, Type::symmetry, Type::velocity_inlet, Type::outflow});
+  auto all = sides({Type::symmetry, Type::symmetry, Type::symmetry, Type::symmetry, Type::velocity_inlet, Type::outflow});
   all[4].speed = 2e-3;
   Grid grid(Comm(), make_node_source(shape), {false, false, false});
   FluidSolver solver(grid, settings, all, &shape);
@@ -218,17 +206,15 @@ TEST_CASE("a skewed grid keeps a uniform flow", "[fluid][ranks]") {
   const auto convection = GENERATE(Convection::none, Convection::extrapolated, Convection::implicit);
   FluidSettings settings;
   settings.convection = convection;
-  auto all = sides({Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet,
-                    Type::velocity_inlet, Type::velocity_inlet});
+  auto all = sides(
+      {Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet, Type::velocity_inlet});
   for (auto& side : all) side.velocity = Triple{0.3, -0.5, 0.8};
   Grid grid(Comm(), warped_box({8, 7, 9}), {false, false, false});
   REQUIRE_FALSE(grid.orthogonal());
   FluidSolver solver(grid, settings, all);
   set_uniform(solver, {0.3, -0.5, 0.8}, 0.1);
   run(solver, 0.1, 5);
-  CHECK(largest_error(solver, [](const Triple&) {
-          return Triple{0.3, -0.5, 0.8};
-        }) < 1e-11);  // the projection's tolerance
+  CHECK(largest_error(solver, [](const Triple&) { return Triple{0.3, -0.5, 0.8}; }) < 1e-11);  // the projection's tolerance
 }
 
 TEST_CASE("a run that blows up stops with the reason", "[fluid]") {
@@ -269,10 +255,11 @@ TEST_CASE("a channel that is closed is named as the cause", "[fluid][ranks]") {
   const IndexSpace index = grid.index();
   Array<NodeKind> kind("corpuscle::test::kind", index.size());
   Kokkos::deep_copy(kind, grid.views().base_kind);
-  for_owned("corpuscle::test::plug", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int at = index.first[2] + k;
-    if (at == 9 || at == 10) kind(index.cell(i, j, k)) = NodeKind::inside;
-  });
+  for_owned(
+      "corpuscle::test::plug", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int at = index.first[2] + k;
+        if (at == 9 || at == 10) kind(index.cell(i, j, k)) = NodeKind::inside;
+      });
   grid.halo().exchange(kind);
   solver.set_kinds(kind);
   solver.begin_step(1);

@@ -30,8 +30,7 @@ inline GridSettings box(const std::array<int, 3>& cells, const Triple& upper) {
   return s;
 }
 
-inline GridSettings tube(int across, int along,
-                         GridSettings::CrossSection map = GridSettings::CrossSection::conformal) {
+inline GridSettings tube(int across, int along, GridSettings::CrossSection map = GridSettings::CrossSection::conformal) {
   GridSettings s;
   s.generator = GridSettings::Generator::straight_tube;
   s.nodes = {across + 1, across + 1, along + 1};
@@ -58,12 +57,8 @@ inline NodeSource warped_box(const std::array<int, 3>& cells) {
           }};
 }
 
-inline auto on_host(const Components<double>& view) {
-  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
-}
-inline auto on_host(const Array<double>& view) {
-  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view);
-}
+inline auto on_host(const Components<double>& view) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view); }
+inline auto on_host(const Array<double>& view) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), view); }
 
 /// body(i, j, k, c) for every owned cell, on the host.
 template <class Body>

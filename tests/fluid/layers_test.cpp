@@ -19,8 +19,8 @@ struct Errors {
 
 /// @param layered  the solver is told that a cell holds two fluids
 Errors two_layers(int n, double ratio, double offset, bool couette, bool layered = true) {
-  auto walls = sides({Type::periodic, Type::periodic, Type::wall, couette ? Type::moving_wall : Type::wall,
-                      Type::periodic, Type::periodic});
+  auto walls =
+      sides({Type::periodic, Type::periodic, Type::wall, couette ? Type::moving_wall : Type::wall, Type::periodic, Type::periodic});
   if (couette) walls[3].velocity = Triple{1, 0, 0};
   FluidSettings settings;
   settings.density_pg_per_um3 = settings.kinematic_viscosity_um2_per_us = 1;
@@ -84,11 +84,11 @@ TEST_CASE("two layers of fluid flow as they should, and lose what drives them", 
     fine = {std::max(fine.velocity, b.velocity), std::max(fine.dissipation, b.dissipation)};
   }
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("{} {}: {:.4f} averaged; velocity {:.4f}, {:.4f}; energy {:.1e}, {:.1e}", couette ? "Couette" : "Poiseuille", ratio, averaged,
-                     coarse.velocity, fine.velocity, coarse.dissipation, fine.dissipation));
+    WARN(fmt::format("{} {}: {:.4f} averaged; velocity {:.4f}, {:.4f}; energy {:.1e}, {:.1e}", couette ? "Couette" : "Poiseuille", ratio,
+                     averaged, coarse.velocity, fine.velocity, coarse.dissipation, fine.dissipation));
   // The interface is smeared over a spacing: of first order.
   CHECK(fine.velocity < 0.03);
-  CHECK(fine.velocity < 0.9 * averaged);  // shear across an interface is borne by one fluid after the other
+  CHECK(fine.velocity < 0.9 * averaged);          // shear across an interface is borne by one fluid after the other
   CHECK(fine.velocity < 0.75 * coarse.velocity);  // the largest of several places between nodes
   CHECK(fine.dissipation < 1e-6);                 // the solver's tolerance
 }

@@ -17,8 +17,8 @@ struct Outcome {
 /// Solve on a box of cells `thin` times as long as wide, with a slab-like body in it, for a right-hand side that an
 /// arbitrary potential makes; then see what divergence the solution leaves.
 /// @param by_amg  leave the coarsest level to BoomerAMG, whatever its size
-Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const std::array<bool, 3>& periodic, bool body,
-                  bool with_outflow, bool by_amg = false) {
+Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const std::array<bool, 3>& periodic, bool body, bool with_outflow,
+                  bool by_amg = false) {
   const Comm comm;
   Grid grid(comm, make_node_source(box(cells, upper)), periodic);
   const IndexSpace index = grid.index();
@@ -33,8 +33,7 @@ Outcome solve_box(const std::array<int, 3>& cells, const Triple& upper, const st
     for_owned(
         "corpuscle::test::body", index, KOKKOS_LAMBDA(int i, int j, int k) {
           const int at = index.first[2] + k, across = index.first[0] + i;
-          if (at >= low && at <= high && across >= wide && across < 3 * wide)
-            kind(index.cell(i, j, k)) = NodeKind::inside;
+          if (at >= low && at <= high && across >= wide && across < 3 * wide) kind(index.cell(i, j, k)) = NodeKind::inside;
         });
   grid.halo().exchange(kind);
   PressureMask outflow("corpuscle::test::outflow", size), mask("corpuscle::test::mask", size);
@@ -97,8 +96,7 @@ TEST_CASE("Chebyshev steps reduce a residual as their polynomial does", "[fluid]
   }
 }
 
-TEST_CASE("the multigrid solve takes few iterations, with bodies, thin cells, odd numbers of them, on any ranks",
-          "[fluid][ranks]") {
+TEST_CASE("the multigrid solve takes few iterations, with bodies, thin cells, odd numbers of them, on any ranks", "[fluid][ranks]") {
   const bool body = GENERATE(false, true);
   const std::array<bool, 3> closed{false, false, false}, along{false, false, true};
   const int most = 13;  // 9 or 10 for nine digits on one rank; blocks of other ranks' cells join differently
@@ -146,7 +144,9 @@ TEST_CASE("a team does small levels as one thread does", "[fluid]") {
   PressureCycle cycle(*open.hierarchy, std::make_unique<InverseCoarsest>(*open.hierarchy));  // as on devices
   cycle.update(index.cell(0, 0, 0));
   const auto b = cycle.finest().b, x = cycle.finest().x;
-  for_owned("corpuscle::test::rhs", index, KOKKOS_LAMBDA(int i, int j, int k) { b(index.cell(i, j, k)) = std::sin(0.7f * i + 0.3f * j - 1.1f * k); });
+  for_owned(
+      "corpuscle::test::rhs", index,
+      KOKKOS_LAMBDA(int i, int j, int k) { b(index.cell(i, j, k)) = std::sin(0.7f * i + 0.3f * j - 1.1f * k); });
   cycle.run();
   REQUIRE(cycle.small_levels().count > 1);
   const Array<CycleReal> alone("corpuscle::test::alone", index.size());
@@ -154,10 +154,12 @@ TEST_CASE("a team does small levels as one thread does", "[fluid]") {
   Kokkos::deep_copy(x, CycleReal(0));
   const auto s = cycle.small_levels();
   using Team = Kokkos::TeamPolicy<Exec>;
-  Kokkos::parallel_for("corpuscle::test::team", Team(1, Kokkos::AUTO),
-                       KOKKOS_LAMBDA(const Team::member_type& team) { cycle_small_levels(TeamCells<Team::member_type>{team}, s); });
+  Kokkos::parallel_for(
+      "corpuscle::test::team", Team(1, Kokkos::AUTO),
+      KOKKOS_LAMBDA(const Team::member_type& team) { cycle_small_levels(TeamCells<Team::member_type>{team}, s); });
   double most = 0, size = 0;
-  const auto one = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), alone), all = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
+  const auto one = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), alone),
+             all = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
   for (int k = 0; k < index.n[2]; ++k)
     for (int j = 0; j < index.n[1]; ++j)
       for (int i = 0; i < index.n[0]; ++i) {
@@ -177,11 +179,13 @@ TEST_CASE("a solve whose outcome is looked at late has the same answer", "[fluid
   cycle.update(index.cell(0, 0, 0));
   PressureMultigrid solver(*open.hierarchy, cycle, open.g.normal, 100);
   solver.update(open.mask);
-  const Array<double> rhs("corpuscle::test::rhs", index.owned()), x("corpuscle::test::x", index.size()), late("corpuscle::test::x", index.size());
+  const Array<double> rhs("corpuscle::test::rhs", index.owned()), x("corpuscle::test::x", index.size()),
+      late("corpuscle::test::x", index.size());
   const auto solve = [&](double wave, double tolerance, const Array<double>& to) {
-    for_owned("corpuscle::test::rhs", index, KOKKOS_LAMBDA(int i, int j, int k) {
-      rhs(index.compact(i, j, k)) = std::sin(0.7 * i + wave * j) * std::cos(6.283185307179586 * k / 32);
-    });
+    for_owned(
+        "corpuscle::test::rhs", index, KOKKOS_LAMBDA(int i, int j, int k) {
+          rhs(index.compact(i, j, k)) = std::sin(0.7 * i + wave * j) * std::cos(6.283185307179586 * k / 32);
+        });
     return solver.solve(rhs, to, tolerance);
   };
   for (const double tolerance : {1e-1, 1e-6, 1e-3}) {  // fewer iterations than before, and more
@@ -192,11 +196,12 @@ TEST_CASE("a solve whose outcome is looked at late has the same answer", "[fluid
     REQUIRE(at_once.converged);
     CHECK(later.converged);
     CHECK(later.iterations == at_once.iterations);
-    const auto a = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x), b = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), late);
+    const auto a = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x),
+               b = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), late);
     double most = 0, size = 0;
     for (int c = 0; c < index.size(); ++c) most = larger(most, std::abs(a(c) - b(c))), size = larger(size, std::abs(a(c)));
     CHECK(size > 0);
-    CHECK(most < 1e-12 * size);  // round-off of the same sums
+    CHECK(most < 1e-12 * size);         // round-off of the same sums
     solve(0.9, 0.1 * tolerance, late);  // so that the next one is taken for longer than it is
   }
 }
@@ -221,8 +226,8 @@ TEST_CASE("solving the coarsest level directly takes no more iterations than Boo
 
 TEST_CASE("a small level is solved directly, whatever is periodic, pinned, cut off or without an unknown", "[fluid]") {
   const bool by_inverse = GENERATE(false, true);  // as on devices
-  const std::array<bool, 3> periodic = GENERATE(std::array<bool, 3>{false, false, false}, std::array<bool, 3>{false, true, false},
-                                                std::array<bool, 3>{true, true, true});
+  const std::array<bool, 3> periodic =
+      GENERATE(std::array<bool, 3>{false, false, false}, std::array<bool, 3>{false, true, false}, std::array<bool, 3>{true, true, true});
   const std::array<int, 3> cells = GENERATE(std::array<int, 3>{6, 7, 5}, std::array<int, 3>{3, 8, 4});
   Grid grid(Comm(), make_node_source(box(cells, {3, 4, 2})), periodic);
   const IndexSpace index = grid.index();
@@ -235,10 +240,11 @@ TEST_CASE("a small level is solved directly, whatever is periodic, pinned, cut o
   const auto kind = grid.views().base_kind;
   const bool plane = GENERATE(false, true);
   const int blocked = cells[1] / 2;
-  for_box("corpuscle::test::mask", {-1, -1, -1}, {cells[0] + 1, cells[1] + 1, cells[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    mask(c) = kind(c) == NodeKind::fluid && !(plane && j == blocked) ? 1 : 0;
-  });
+  for_box(
+      "corpuscle::test::mask", {-1, -1, -1}, {cells[0] + 1, cells[1] + 1, cells[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        mask(c) = kind(c) == NodeKind::fluid && !(plane && j == blocked) ? 1 : 0;
+      });
   MultigridHierarchy hierarchy(grid, g.normal);
   hierarchy.update(mask);
   REQUIRE(hierarchy.levels().size() == 1);
@@ -253,23 +259,28 @@ TEST_CASE("a small level is solved directly, whatever is periodic, pinned, cut o
   auto& level = cycle.finest();
   const Array<CycleReal> some("corpuscle::test::some", size);
   const auto views = level.views;
-  for_owned("corpuscle::test::some", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    some(c) = views.inverse(c) > 0 ? std::sin(1.7f * i + 2.3f * j) + 0.4f * k : 0.0f;
-  });
+  for_owned(
+      "corpuscle::test::some", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        some(c) = views.inverse(c) > 0 ? std::sin(1.7f * i + 2.3f * j) + 0.4f * k : 0.0f;
+      });
   grid.halo().exchange(some);
   const auto b = level.b, x = level.x;
-  for_owned("corpuscle::test::image", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k);
-    b(c) = views.inverse(c) > 0 ? views.apply(some, c) : 0.0f;
-  });
+  for_owned(
+      "corpuscle::test::image", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k);
+        b(c) = views.inverse(c) > 0 ? views.apply(some, c) : 0.0f;
+      });
   cycle.run();
   grid.halo().exchange(x);
   double left = 0;
-  reduce_owned("corpuscle::test::left", index, KOKKOS_LAMBDA(int i, int j, int k, double& most) {
-    const int c = index.cell(i, j, k);
-    most = larger(most, std::abs(double(b(c)) - (views.inverse(c) > 0 ? views.apply(x, c) : x(c))));
-  }, Largest(left));
+  reduce_owned(
+      "corpuscle::test::left", index,
+      KOKKOS_LAMBDA(int i, int j, int k, double& most) {
+        const int c = index.cell(i, j, k);
+        most = larger(most, std::abs(double(b(c)) - (views.inverse(c) > 0 ? views.apply(x, c) : x(c))));
+      },
+      Largest(left));
   // Single precision of coefficients and values of up to about 30, and what is cut off is compatible to that only.
   CHECK(left < 1e-4);
 }
@@ -293,22 +304,25 @@ PressureMask around_body(Grid& grid) {
   const Array<std::int8_t> open("corpuscle::test::open", index.size());
   const PressureMask mask("corpuscle::test::mask", index.size());
   const int wide = index.global[0] / 4, middle = index.global[2] / 2;
-  for_owned("corpuscle::test::open", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int at = index.first[2] + k, across = index.first[0] + i;
-    open(index.cell(i, j, k)) = at >= middle - 1 && at <= middle + 1 && across >= wide && across < 3 * wide ? 0 : 1;
-  });
+  for_owned(
+      "corpuscle::test::open", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int at = index.first[2] + k, across = index.first[0] + i;
+        open(index.cell(i, j, k)) = at >= middle - 1 && at <= middle + 1 && across >= wide && across < 3 * wide ? 0 : 1;
+      });
   grid.halo().exchange(open);
-  Kokkos::parallel_for("corpuscle::test::mask", Policy(0, index.size()), KOKKOS_LAMBDA(int c) { mask(c) = open(c); });
+  Kokkos::parallel_for(
+      "corpuscle::test::mask", Policy(0, index.size()), KOKKOS_LAMBDA(int c) { mask(c) = open(c); });
   return mask;
 }
 
 /// Depends on where a cell is in the whole grid.
 void fill(const IndexSpace& index, const PressureMask& mask, const Array<CycleReal>& b, const Components<CycleReal>& u) {
-  for_owned("corpuscle::test::right_hand_side", index, KOKKOS_LAMBDA(int i, int j, int k) {
-    const int c = index.cell(i, j, k), a = index.first[0] + i, e = index.first[1] + j, f = index.first[2] + k;
-    b(c) = mask(c) ? std::sin(0.9f * a + 0.3f * e) + std::cos(1.1f * e - 0.7f * f) : 0.0f;
-    for (int m = 0; m < 3; ++m) u(c, m) = mask(c) ? std::sin(0.4f * a + 0.5f * e + 0.2f * f + m) : 0.0f;
-  });
+  for_owned(
+      "corpuscle::test::right_hand_side", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const int c = index.cell(i, j, k), a = index.first[0] + i, e = index.first[1] + j, f = index.first[2] + k;
+        b(c) = mask(c) ? std::sin(0.9f * a + 0.3f * e) + std::cos(1.1f * e - 0.7f * f) : 0.0f;
+        for (int m = 0; m < 3; ++m) u(c, m) = mask(c) ? std::sin(0.4f * a + 0.5f * e + 0.2f * f + m) : 0.0f;
+      });
 }
 
 std::unique_ptr<Cycles> make_cycles(const Comm& comm, const std::array<int, 3>& cells, const Triple& upper,
@@ -360,7 +374,8 @@ TEST_CASE("coarse levels are gathered on a number of ranks that is no power of t
     auto shared = make_cycles(three, cells, {6, 5, 8}, {false, false, true});
     auto alone = make_cycles(Comm::alone(), cells, {6, 5, 8}, {false, false, true});
     shared->pressure->run(), alone->pressure->run();
-    CHECK(difference(shared->grid.index(), alone->grid.index(), shared->pressure->finest().x, alone->pressure->finest().x) < 1e-5);  // single precision
+    CHECK(difference(shared->grid.index(), alone->grid.index(), shared->pressure->finest().x, alone->pressure->finest().x) <
+          1e-5);  // single precision
   }
   MPI_Comm_free(&some);
 }
@@ -369,10 +384,10 @@ TEST_CASE("a multigrid cycle is that of one rank however the grid is cut", "[flu
   using Bool = std::array<bool, 3>;
   for (const auto& [cells, upper, periodic] :
        {std::tuple<std::array<int, 3>, Triple, Bool>{{24, 20, 32}, {6, 5, 8}, {false, false, false}},
-        {{23, 19, 33}, {6, 5, 24}, {false, false, true}},   // pairs that two ranks share
+        {{23, 19, 33}, {6, 5, 24}, {false, false, true}},  // pairs that two ranks share
         {{26, 22, 50}, {6, 5, 24}, {true, false, false}},
         {{14, 16, 18}, {3, 3, 3}, {true, true, true}},
-        {{14, 36, 18}, {3, 8, 4}, {true, false, true}},     // cut along a direction before one that wraps
+        {{14, 36, 18}, {3, 8, 4}, {true, false, true}},  // cut along a direction before one that wraps
         {{36, 14, 16}, {8, 3, 4}, {false, true, true}},
         {{40, 42, 44}, {3, 3, 3}, {false, true, false}}}) {  // more than one level below the finest is cut
     INFO(cells[0] << " x " << cells[1] << " x " << cells[2] << " cells");

@@ -68,9 +68,8 @@ double row_error(const Scene& s) {
   const auto mask = s.mask;
   const auto kind = s.kind;
   Kokkos::parallel_for(
-      "corpuscle::test::psi", Policy(0, index.size()), KOKKOS_LAMBDA(int c) {
-        psi(c) = kind(c) == NodeKind::fluid ? std::sin(0.37 * c) + 0.2 * std::cos(0.011 * c) : 0.0;
-      });
+      "corpuscle::test::psi", Policy(0, index.size()),
+      KOKKOS_LAMBDA(int c) { psi(c) = kind(c) == NodeKind::fluid ? std::sin(0.37 * c) + 0.2 * std::cos(0.011 * c) : 0.0; });
   Array<double> flux[3];
   for (auto& f : flux) f = Array<double>("corpuscle::test::flux", index.size());
   const Array<double> divergence("corpuscle::test::divergence", index.owned());
@@ -126,8 +125,7 @@ double linear_error(const Scene& s) {
           double error = norm(cell_gradient(p, mask, x, index, c) - slope);
           const int low = c - index.stride(d);
           bool face = mask(low);
-          for (int e = 0; e < 3; ++e)
-            face = face && (e == d || mask(low - index.stride(e)) || mask(low + index.stride(e)));
+          for (int e = 0; e < 3; ++e) face = face && (e == d || mask(low - index.stride(e)) || mask(low + index.stride(e)));
           if (face) {
             const Vec3 a = load(area, c);
             const double flux = skewed ? face_gradient<true>(p, mask, x, a, coefficient(c), index, d, c)
@@ -193,7 +191,8 @@ TEST_CASE("the Krylov solver reaches the tolerance it is given", "[fluid][ranks]
   // One for each, since both work on their system's vectors.
   HypreSystem system(grid.comm(), grid.index(), grid.halo(), skewed), same(grid.comm(), grid.index(), grid.halo(), skewed);
   AlgebraicMultigrid amg(same);
-  PressureKrylov solver(system, [&](const Array<double>& r, const Array<double>& z) { amg.cycle(r, z); }, 200);
+  PressureKrylov solver(
+      system, [&](const Array<double>& r, const Array<double>& z) { amg.cycle(r, z); }, 200);
   const IndexSpace index = grid.index();
   ViscousCoefficients g;
   for (int d = 0; d < 3; ++d) {
@@ -206,12 +205,10 @@ TEST_CASE("the Krylov solver reaches the tolerance it is given", "[fluid][ranks]
   const int pinned = comm.root() ? index.cell(0, 0, 0) : -1;
   if (skewed) {
     viscous_coefficients<true>(grid.views(), g);
-    pressure_rows<true>(grid.views(), g.normal, grid.views().base_kind, mask, system.pattern(), pinned,
-                        system.values());
+    pressure_rows<true>(grid.views(), g.normal, grid.views().base_kind, mask, system.pattern(), pinned, system.values());
   } else {
     viscous_coefficients<false>(grid.views(), g);
-    pressure_rows<false>(grid.views(), g.normal, grid.views().base_kind, mask, system.pattern(), pinned,
-                         system.values());
+    pressure_rows<false>(grid.views(), g.normal, grid.views().base_kind, mask, system.pattern(), pinned, system.values());
   }
   Kokkos::deep_copy(same.values(), system.values());
   system.set_values();
@@ -269,8 +266,8 @@ std::string message_for_zero_row(const Comm& comm) {
   HypreSystem system(grid.comm(), grid.index(), grid.halo(), false);
   const auto value = system.values();
   const int zero = comm.rank() == comm.size() - 1 ? 17 : -1;
-  Kokkos::parallel_for("corpuscle::test::rows", Policy(0, grid.index().owned()),
-                       KOKKOS_LAMBDA(int r) { value(r, 0) = r == zero ? 0.0 : 1.0; });
+  Kokkos::parallel_for(
+      "corpuscle::test::rows", Policy(0, grid.index().owned()), KOKKOS_LAMBDA(int r) { value(r, 0) = r == zero ? 0.0 : 1.0; });
   system.set_values();
   AlgebraicMultigrid amg(system);
   try {
@@ -283,8 +280,7 @@ std::string message_for_zero_row(const Comm& comm) {
 
 }  // namespace
 
-TEST_CASE("a failure that hypre reports stops all ranks with its words, and is not held against what follows",
-          "[fluid][ranks]") {
+TEST_CASE("a failure that hypre reports stops all ranks with its words, and is not held against what follows", "[fluid][ranks]") {
   const Comm comm;
   const std::string message = message_for_zero_row(comm);
   CHECK_THAT(message, Catch::Contains("pressure: hypre could not set up BoomerAMG"));

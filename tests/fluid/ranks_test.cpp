@@ -58,9 +58,7 @@ TEST_CASE("velocities and pressures do not depend on the decomposition", "[fluid
   const Comm comm, alone;
 #endif
   using Convection = FluidSettings::Convection;
-  Flow flow = GENERATE(tube_flow(Convection::none),
-                       tube_flow(Convection::extrapolated),
-                       tube_flow(Convection::implicit), channel_flow());
+  Flow flow = GENERATE(tube_flow(Convection::none), tube_flow(Convection::extrapolated), tube_flow(Convection::implicit), channel_flow());
   // Solver tolerances far below the difference that is looked for.
   flow.settings.momentum_tolerance = 1e-12;
   flow.settings.divergence_tolerance = 1e-12;

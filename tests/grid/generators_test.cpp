@@ -56,8 +56,7 @@ TEST_CASE("the square's edge lands exactly on the circle", "[grid]") {
   const Map map = GENERATE(Map::conformal, Map::elliptical);
   for (int n = 0; n <= 40; ++n) {
     const double t = -1 + n / 20.0;
-    for (const auto& p :
-         {square_to_disk(t, -1, map), square_to_disk(1, t, map), square_to_disk(t, 1, map), square_to_disk(-1, t, map)})
+    for (const auto& p : {square_to_disk(t, -1, map), square_to_disk(1, t, map), square_to_disk(t, 1, map), square_to_disk(-1, t, map)})
       CHECK(std::hypot(p[0], p[1]) == Approx(1).epsilon(2e-14));  // round-off of the series behind the conformal map
   }
   const auto middle = square_to_disk(0, 0, map);
@@ -128,8 +127,7 @@ TEST_CASE("the spline passes through its points", "[grid]") {
   constexpr int samples = 40000;
   for (const auto& point : s.points_um) {
     double nearest = 1e9;
-    for (int m = 0; m <= samples; ++m)
-      nearest = std::min(nearest, distance(curve.at(curve.length() * m / samples).position, point));
+    for (int m = 0; m <= samples; ++m) nearest = std::min(nearest, distance(curve.at(curve.length() * m / samples).position, point));
     CHECK(nearest < curve.length() / samples);  // the spacing of the samples
   }
 }
@@ -141,9 +139,7 @@ TEST_CASE("frames are orthonormal, follow the tangent and do not twist", "[grid]
   double turned = 0;
   for (double at = 0; at + step < curve.length(); at += step) {
     const auto f = curve.at(at), g = curve.at(at + step);
-    REQUIRE(std::abs(dot(f.tangent, f.normal)) + std::abs(dot(f.tangent, f.binormal)) +
-                std::abs(dot(f.normal, f.binormal)) <
-            1e-12);
+    REQUIRE(std::abs(dot(f.tangent, f.normal)) + std::abs(dot(f.tangent, f.binormal)) + std::abs(dot(f.normal, f.binormal)) < 1e-12);
     REQUIRE(std::abs(dot(f.normal, f.normal) - 1) + std::abs(dot(f.binormal, f.binormal) - 1) < 1e-12);
     const Triple chord{g.position[0] - f.position[0], g.position[1] - f.position[1], g.position[2] - f.position[2]};
     REQUIRE(dot(chord, f.tangent) / std::sqrt(dot(chord, chord)) > 1 - 1e-4);  // turns by 0.1 / um x 0.02 um at most

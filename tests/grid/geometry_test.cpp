@@ -46,9 +46,7 @@ double worst_linear_flux(const GridViews& grid) {
             const Vec3 s = load(area, c), g = face_coefficients(x, s, index, d, c);
             double flux = g[d] * dot(slope, load(x, c) - load(x, low));
             for (int e = 0; e < 3; ++e)
-              if (e != d)
-                flux += g[e] * 0.5 *
-                        dot(slope, central_offset(x, c, index.stride(e)) + central_offset(x, low, index.stride(e)));
+              if (e != d) flux += g[e] * 0.5 * dot(slope, central_offset(x, c, index.stride(e)) + central_offset(x, low, index.stride(e)));
             const double error = std::abs(flux - dot(slope, s)) / norm(s);
             most = larger(most, error);
           }

@@ -71,11 +71,9 @@ TEST_CASE("halos hold the neighbour's cells, corners and periodic images include
   Halo halo(comm, index, ranks);
   const int n = index.size();
   CHECK(wrong_entries(index, halo, Array<double>("corpuscle::test::d", n), [](int g, int) { return 0.5 * g; }) == 0);
-  CHECK(wrong_entries(index, halo, Components<double>("corpuscle::test::v", n, 3),
-                      [](int g, int m) { return g + 1000.0 * m; }) == 0);
+  CHECK(wrong_entries(index, halo, Components<double>("corpuscle::test::v", n, 3), [](int g, int m) { return g + 1000.0 * m; }) == 0);
   CHECK(wrong_entries(index, halo, Array<int>("corpuscle::test::i", n), [](int g, int) { return g; }) == 0);
-  CHECK(wrong_entries(index, halo, Array<NodeKind>("corpuscle::test::k", n),
-                      [](int g, int) { return static_cast<NodeKind>(g % 5); }) == 0);
+  CHECK(wrong_entries(index, halo, Array<NodeKind>("corpuscle::test::k", n), [](int g, int) { return static_cast<NodeKind>(g % 5); }) == 0);
 }
 
 TEST_CASE("blocks tile the grid once", "[grid][ranks]") {

@@ -16,8 +16,10 @@ using namespace corpuscle;
 TEST_CASE("small boxes are done by the calling thread, large ones by all") {
   const auto in_parallel = [](int side) {
     Array<int> found("corpuscle::test::found", side);
-    for_box("corpuscle::test::box", {0, 0, 0}, {side, side, side},
-            KOKKOS_LAMBDA(int i, int j, int k) { if (j == 0 && k == 0) found(i) = omp_in_parallel() ? 2 : 1; });
+    for_box(
+        "corpuscle::test::box", {0, 0, 0}, {side, side, side}, KOKKOS_LAMBDA(int i, int j, int k) {
+          if (j == 0 && k == 0) found(i) = omp_in_parallel() ? 2 : 1;
+        });
     return found(0);
   };
   CHECK(in_parallel(12) == 1);
@@ -34,7 +36,10 @@ TEST_CASE("who adds up a sum does not change its bits") {
   double by_all = 0;
   Kokkos::parallel_reduce(
       "corpuscle::test::sum", Policy(0, threads),
-      [=](int thread, double& total) { total += sum_lines({7, 5, 9}, thread, threads, body); }, by_all);
+      [=](int thread, double& total) {
+        total += sum_lines({7, 5, 9}, thread, threads, body);
+      },
+      by_all);
   CHECK(sum_owned("corpuscle::test::sum", index, body) == by_all);
 }
 
@@ -48,7 +53,8 @@ TEST_CASE("every cell of boxes is visited once, by lines and by numbers") {
   CHECK(boxes.size() == 63 + 9 + 42);
   const auto at = [](int i, int j, int k) { return (i + 2) + 7 * (j + 6 * (k - 1)); };
   Array<int> by_lines("corpuscle::test::visits", 7 * 6 * 4), by_numbers("corpuscle::test::visits", 7 * 6 * 4);
-  for_boxes("corpuscle::test::boxes", boxes, KOKKOS_LAMBDA(int b, int i, int j, int k) { by_lines(at(i, j, k)) += b + 1; });
+  for_boxes(
+      "corpuscle::test::boxes", boxes, KOKKOS_LAMBDA(int b, int i, int j, int k) { by_lines(at(i, j, k)) += b + 1; });
   for (int e = 0; e < boxes.size(); ++e) boxes.visit(e, [&](int b, int i, int j, int k) { by_numbers(at(i, j, k)) += b + 1; });
   int wrong = 0;
   for (int k = 1; k < 5; ++k)
@@ -63,9 +69,9 @@ TEST_CASE("every cell of boxes is visited once, by lines and by numbers") {
 TEST_CASE("every cell of a box is visited once, whatever its size") {
   for (const int side : {1, 3, 12, 13, 31}) {
     Array<int> visits("corpuscle::test::visits", side * (side + 1) * (side + 2));
-    for_box("corpuscle::test::box", {-1, 2, 0}, {side - 1, side + 3, side + 2}, KOKKOS_LAMBDA(int i, int j, int k) {
-      visits(i + 1 + side * (j - 2 + (side + 1) * k)) += 1;
-    });
+    for_box(
+        "corpuscle::test::box", {-1, 2, 0}, {side - 1, side + 3, side + 2},
+        KOKKOS_LAMBDA(int i, int j, int k) { visits(i + 1 + side * (j - 2 + (side + 1) * k)) += 1; });
     int wrong = 0;
     for (std::size_t n = 0; n < visits.extent(0); ++n) wrong += visits(n) != 1;
     CHECK(wrong == 0);

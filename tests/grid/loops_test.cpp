@@ -52,11 +52,13 @@ TEST_CASE("sums over owned cells count each cell once", "[grid]") {
   const std::array<int, 3> n = GENERATE(std::array{7, 5, 3}, std::array{3, 5, 7}, std::array{1, 1, 4}, std::array{19, 17, 13});
   const IndexSpace index = block(n);
   const double expected = sum_of_marks(index);
-  const double sum = sum_owned("corpuscle::test::sum", index, KOKKOS_LAMBDA(int i, int j, int k) { return mark(i, j, k); });
+  const double sum = sum_owned(
+      "corpuscle::test::sum", index, KOKKOS_LAMBDA(int i, int j, int k) { return mark(i, j, k); });
   CHECK(sum == expected);
   double reduced = 0;
-  reduce_owned("corpuscle::test::reduce", index,
-               KOKKOS_LAMBDA(int i, int j, int k, double& total) { total += mark(i, j, k); }, Kokkos::Sum<double>(reduced));
+  reduce_owned(
+      "corpuscle::test::reduce", index, KOKKOS_LAMBDA(int i, int j, int k, double& total) { total += mark(i, j, k); },
+      Kokkos::Sum<double>(reduced));
   CHECK(reduced == expected);
 }
 
@@ -64,7 +66,8 @@ TEST_CASE("a loop over a box runs each of its cells once", "[grid]") {
   const IndexSpace index = block({9, 6, 4});
   const std::array<int, 3> lower = GENERATE(std::array{0, 0, 0}, std::array{-2, 1, -1}, std::array{3, -3, 2}), upper{8, 5, 4};
   const Array<int> visits("corpuscle::test::visits", index.size());
-  for_box("corpuscle::test::box", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) { visits(index.cell(i, j, k)) += 1; });
+  for_box(
+      "corpuscle::test::box", lower, upper, KOKKOS_LAMBDA(int i, int j, int k) { visits(index.cell(i, j, k)) += 1; });
   const auto host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), visits);
   for (int c = 0; c < index.size(); ++c) {
     int at[3];

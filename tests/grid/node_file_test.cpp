@@ -24,8 +24,7 @@ namespace {
 struct TemporaryFile {
   std::string path;
   explicit TemporaryFile(const std::string& name)
-      : path((std::filesystem::temp_directory_path() /
-              ("corpuscle_nodes_" + std::to_string(static_cast<long>(::getpid())) + "_" + name))
+      : path((std::filesystem::temp_directory_path() / ("corpuscle_nodes_" + std::to_string(static_cast<long>(::getpid())) + "_" + name))
                  .string()) {}
   ~TemporaryFile() {
     std::error_code ignored;
@@ -33,8 +32,7 @@ struct TemporaryFile {
   }
 };
 
-void write_nodes(const std::string& path, const char* name, const std::vector<hsize_t>& shape,
-                 const std::vector<double>& values) {
+void write_nodes(const std::string& path, const char* name, const std::vector<hsize_t>& shape, const std::vector<double>& values) {
   const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
   const hid_t set = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);

@@ -20,8 +20,8 @@ struct Soup {
     const auto b = on_host(s.triangle_body);
     for (const Vec3& shift : shifts) {
       for (int e = 0; e < s.triangles; ++e) {
-        triangles.push_back({corpuscle::load(x, t(e, 0)) + shift, corpuscle::load(x, t(e, 1)) + shift,
-                             corpuscle::load(x, t(e, 2)) + shift});
+        triangles.push_back(
+            {corpuscle::load(x, t(e, 0)) + shift, corpuscle::load(x, t(e, 1)) + shift, corpuscle::load(x, t(e, 2)) + shift});
         body.push_back(b(e));
       }
     }

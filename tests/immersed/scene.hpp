@@ -99,9 +99,8 @@ inline TriangleMesh unit_sphere(int level) {
   TriangleMesh mesh;
   mesh.vertices = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
                    {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
-  mesh.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-                    {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+  mesh.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                    {3, 9, 4},  {3, 4, 2}, {3, 2, 6}, {3, 6, 8},  {3, 8, 9},   {4, 9, 5}, {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
   for (int l = 0; l < level; ++l) {
     std::map<std::pair<int, int>, int> middle;
     std::vector<std::array<int, 3>> finer;
@@ -149,8 +148,7 @@ inline TriangleMesh biconcave(int level, const Vec3& centre, double tilt = 0) {
   for (auto& v : mesh.vertices) {
     const double x = 0.5 * d0 * v[0], y = 0.5 * d0 * v[1], q = (x * x + y * y) / (d0 * d0);
     const double z = d0 * v[2] * (a0 + a1 * q + a2 * q * q);
-    v = {centre.x + std::cos(tilt) * x + std::sin(tilt) * z, centre.y + y,
-         centre.z - std::sin(tilt) * x + std::cos(tilt) * z};
+    v = {centre.x + std::cos(tilt) * x + std::sin(tilt) * z, centre.y + y, centre.z - std::sin(tilt) * x + std::cos(tilt) * z};
   }
   return mesh;
 }

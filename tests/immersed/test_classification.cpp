@@ -352,8 +352,7 @@ TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body
   for (int c = 0; c < grid.index.size(); ++c) {
     if (kind(c) != NodeKind::fluid) continue;
     for (int d = 0; d < 3; ++d) {
-      expected += (kind(c - grid.index.stride(d)) == NodeKind::immersed) +
-                  (kind(c + grid.index.stride(d)) == NodeKind::immersed);
+      expected += (kind(c - grid.index.stride(d)) == NodeKind::immersed) + (kind(c + grid.index.stride(d)) == NodeKind::immersed);
     }
   }
   REQUIRE(ib.counts().faces == expected);

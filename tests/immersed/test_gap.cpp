@@ -18,8 +18,8 @@ struct Gap {
 
   Gap(double h, double spacings, double moved, const VectorField& velocity, double pressure)
       : grid(make_grid({{28, 20, 20}}, uniform({(moved - 14) * h, -10 * h, -10 * h}, {h, h, h}))),
-        surface(make_surface_set({sphere(3, 1.5, {-1.5 - spacings * h / 2, 0.01, 0.02}),
-                                  sphere(3, 1.5, {1.5 + spacings * h / 2, 0.01, 0.02})})),
+        surface(make_surface_set(
+            {sphere(3, 1.5, {-1.5 - spacings * h / 2, 0.01, 0.02}), sphere(3, 1.5, {1.5 + spacings * h / 2, 0.01, 0.02})})),
         ib(grid, surface, {}) {
     set_velocity(surface, velocity);
     ib.classify();
@@ -76,13 +76,15 @@ TEST_CASE("a surface that moves is resisted, wherever the nodes around it lie") 
     const auto normal = on_host(surface.normal);
     Kokkos::deep_copy(surface.v, surface.normal);
     TractionInput in;
-    in.u = sample(grid.x, [](const Vec3&) { return Vec3{}; }, [](int) { return true; });
+    in.u = sample(
+        grid.x, [](const Vec3&) { return Vec3{}; }, [](int) { return true; });
     in.p = sample(grid.x, ScalarField([](const Vec3&) { return 0.0; }), [](int) { return true; });
     in.viscosity = 1;
     const auto stress = on_host(ib.find_stress(in).values);
     for (int i = 0; i < surface.vertices; ++i) {
       const Vec3 n = load(normal, i);
-      INFO("tilt " << tilt << ", moved by " << moved << " spacings, vertex " << i << ", normal (" << n.x << ", " << n.y << ", " << n.z << ")");
+      INFO("tilt " << tilt << ", moved by " << moved << " spacings, vertex " << i << ", normal (" << n.x << ", " << n.y << ", " << n.z
+                   << ")");
       // The least: a line from the surface to a point 2.5 spacings away, along the normal.
       const double spacing = 1 / std::max({std::abs(n.x) / h, std::abs(n.y) / h, std::abs(n.z) / along});
       CHECK(dot(Vec3{stress(i, 1), stress(i, 2), stress(i, 3)}, n) < -2 / (2.5 * spacing) * (1 - 1e-9));

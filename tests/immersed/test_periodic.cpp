@@ -44,8 +44,7 @@ TEST_CASE("bodies come back into a periodic domain as a whole, wherever they are
   const Vec3 shift = away - home;
   const int half = surface.vertices / 2;
   for (int i = 0; i < surface.vertices; ++i)
-    for (int m = 0; m < 3; ++m)
-      REQUIRE(wrapped(i, m) == Approx(start(i, m) - (i < half ? shift[m] : 0)).margin(1e-13));
+    for (int m = 0; m < 3; ++m) REQUIRE(wrapped(i, m) == Approx(start(i, m) - (i < half ? shift[m] : 0)).margin(1e-13));
   CHECK(ib.laps_state() == std::vector<double>{2, -3, 0, 0, 0, 0});
   ib.classify();
   CHECK(ib.counts().owned_vertices == surface.vertices);  // both spheres, one upon the other

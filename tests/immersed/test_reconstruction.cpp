@@ -24,8 +24,7 @@ Errors reconstruct(const GridViews& grid, ImmersedBoundary& ib, const SurfaceSet
   ib.classify();
   ib.build_stencils();
   const auto kind = on_host(ib.nodes().kind);
-  const auto u =
-      sample(grid.x, u_exact, [&](int c) { return kind(c) == NodeKind::fluid || kind(c) == NodeKind::boundary; });
+  const auto u = sample(grid.x, u_exact, [&](int c) { return kind(c) == NodeKind::fluid || kind(c) == NodeKind::boundary; });
   const auto p = sample(grid.x, p_exact, [&](int c) { return kind(c) == NodeKind::fluid; });
   ib.reconstruct_velocity(u);
   ib.extend_pressure(p);
@@ -134,10 +133,9 @@ TEST_CASE("stencils keep to their own side of a thin film") {
   ib.classify();
   ib.build_stencils();
   const auto kind = on_host(ib.nodes().kind);
-  const auto u =
-      sample(grid.x, sided, [&](int c) { return kind(c) == NodeKind::fluid || kind(c) == NodeKind::boundary; });
-  const auto p = sample(grid.x, ScalarField([](const Vec3& x) { return x.z > 0 ? 1.0 : -1.0; }),
-                        [&](int c) { return kind(c) == NodeKind::fluid; });
+  const auto u = sample(grid.x, sided, [&](int c) { return kind(c) == NodeKind::fluid || kind(c) == NodeKind::boundary; });
+  const auto p =
+      sample(grid.x, ScalarField([](const Vec3& x) { return x.z > 0 ? 1.0 : -1.0; }), [&](int c) { return kind(c) == NodeKind::fluid; });
   ib.reconstruct_velocity(u);
   ib.extend_pressure(p);
   const auto u_host = on_host(u), x = on_host(grid.x);

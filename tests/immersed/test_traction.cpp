@@ -27,8 +27,8 @@ FluidStress stress_of(ImmersedBoundary& ib, const SurfaceSet& surface, const Tra
 }
 
 /// Exact u and p on fluid and boundary nodes, reconstruction, tractions; compared with `exact` at each vertex.
-Load measure(const GridViews& grid, const SurfaceSet& surface, const Vec3& centre, double viscosity,
-             const VectorField& u_exact, const ScalarField& p_exact, const VectorField& exact) {
+Load measure(const GridViews& grid, const SurfaceSet& surface, const Vec3& centre, double viscosity, const VectorField& u_exact,
+             const ScalarField& p_exact, const VectorField& exact) {
   set_velocity(surface, u_exact);
   ImmersedBoundary ib(grid, surface, {});
   ib.classify();
@@ -50,8 +50,7 @@ Load measure(const GridViews& grid, const SurfaceSet& surface, const Vec3& centr
     size += dot(want, want);
   }
   load_.relative_rms = std::sqrt(difference / size);
-  Components<double> about("corpuscle::test::centre", surface.bodies, 3),
-      loads("corpuscle::test::loads", surface.bodies, 6);
+  Components<double> about("corpuscle::test::centre", surface.bodies, 3), loads("corpuscle::test::loads", surface.bodies, 6);
   const auto about_host = Kokkos::create_mirror_view(about);
   for (int d = 0; d < 3; ++d) about_host(0, d) = centre[d];
   Kokkos::deep_copy(about, about_host);
@@ -71,8 +70,8 @@ Load sphere_load(int n, int level, bool rotating, const Vec3& motion) {
   const SurfaceSet surface = make_surface_set({sphere(level, 1, flow.centre)});
   if (!rotating) {
     return measure(
-        grid, surface, flow.centre, viscosity, [=](const Vec3& x) { return flow.u(x); },
-        [=](const Vec3& x) { return flow.p(x); }, [=](const Vec3&) { return (-1.5 * viscosity) * motion; });
+        grid, surface, flow.centre, viscosity, [=](const Vec3& x) { return flow.u(x); }, [=](const Vec3& x) { return flow.p(x); },
+        [=](const Vec3&) { return (-1.5 * viscosity) * motion; });
   }
   const auto u = [=](const Vec3& x) {
     const Vec3 r = x - flow.centre;
@@ -88,9 +87,7 @@ Load sphere_load(int n, int level, bool rotating, const Vec3& motion) {
 TEST_CASE("tractions of linear fields are exact on skewed and wavy grids") {
   const double viscosity = 1.3;
   const Vec3 gradient[3] = {{0.2, -0.1, 0.4}, {0, 0.5, 0.3}, {0.2, 0, -0.7}};
-  const VectorField u = [&](const Vec3& x) {
-    return Vec3{0.3 + dot(gradient[0], x), -0.1 + dot(gradient[1], x), dot(gradient[2], x)};
-  };
+  const VectorField u = [&](const Vec3& x) { return Vec3{0.3 + dot(gradient[0], x), -0.1 + dot(gradient[1], x), dot(gradient[2], x)}; };
   const Vec3 slope{-0.4, 0.25, 0.6}, imposed{0.01, 0.02, -0.03}, origin{0.5, 0, 1};
   const double level = GENERATE(1.3, 1e4);
   const ScalarField p = [&](const Vec3& x) { return level + dot(slope, x); };

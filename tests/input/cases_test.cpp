@@ -6,8 +6,8 @@
 
 #include "core/error.hpp"
 #include "core/units.hpp"
-#include "input/case_file.hpp"
 #include "input/case_changes.hpp"
+#include "input/case_file.hpp"
 
 using namespace corpuscle;
 namespace fs = std::filesystem;
@@ -16,9 +16,7 @@ namespace {
 
 const fs::path cases = fs::path(CORPUSCLE_SOURCE_DIR) / "cases";
 
-Case read(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  return read_case((cases / name).string(), overrides);
-}
+Case read(const std::string& name, const std::vector<std::string>& overrides = {}) { return read_case((cases / name).string(), overrides); }
 
 // The same but for where it was read from and the text of the echo.
 void require_same(const Case& a, const Case& b) {
@@ -65,11 +63,10 @@ TEST_CASE("every case file reads, and its echo reads back to the same case") {
 
 TEST_CASE("the echo keeps overrides, awkward texts and every kind of value") {
   const auto scene =
-      read("straight_tube.toml",
-           {"title=\"a \\\"quoted\\\" \\\\ title\\n with two lines\"", "boundary.0.profile=table",
-            "boundary.0.radial_table=[[0, 2], [0.5, 1.5], [1, 0]]", "boundary.0.velocity_mm_per_s=1.23456789",
-            "cells.0.bending_modulus_J=1.7e-19", "cells.0.spin_deg=0.1", "fluid.convection=implicit",
-            "output.fields=[\"pressure\"]", "coupling.robin_coefficient_pg_per_um2_per_us=4.5"});
+      read("straight_tube.toml", {"title=\"a \\\"quoted\\\" \\\\ title\\n with two lines\"", "boundary.0.profile=table",
+                                  "boundary.0.radial_table=[[0, 2], [0.5, 1.5], [1, 0]]", "boundary.0.velocity_mm_per_s=1.23456789",
+                                  "cells.0.bending_modulus_J=1.7e-19", "cells.0.spin_deg=0.1", "fluid.convection=implicit",
+                                  "output.fields=[\"pressure\"]", "coupling.robin_coefficient_pg_per_um2_per_us=4.5"});
   REQUIRE(scene.title == "a \"quoted\" \\ title\n with two lines");
   REQUIRE(scene.coupling->robin_coefficient == 4.5);
   REQUIRE_FALSE(scene.output.velocity);
@@ -282,9 +279,7 @@ TEST_CASE("a flow with cells but no [coupling] is coupled by robin") {
 
 TEST_CASE("convection takes true, false and two words") {
   using Convection = FluidSettings::Convection;
-  const auto with = [](const std::string& value) {
-    return read("tube_flow.toml", {"fluid.convection=" + value}).fluid->convection;
-  };
+  const auto with = [](const std::string& value) { return read("tube_flow.toml", {"fluid.convection=" + value}).fluid->convection; };
   REQUIRE(with("true") == Convection::extrapolated);
   REQUIRE(with("false") == Convection::none);
   REQUIRE(with("extrapolated") == Convection::extrapolated);
@@ -293,12 +288,12 @@ TEST_CASE("convection takes true, false and two words") {
 }
 
 TEST_CASE("the keys that scripts rely on can all be set") {
-  const auto scene = read("straight_tube.toml",
-                          {"time.step_us=2", "time.end_us=10", "grid.nodes=[21,22,23]", "fluid.density_pg_per_um3=1.1",
-                           "fluid.kinematic_viscosity_um2_per_us=0.9", "fluid.convection=false",
-                           "cells.0.vertices=1000", "cells.0.mass_pg=7200", "cells.0.reference=spontaneous-angle",
-                           "cells.0.interior=empty", "cells.0.shear_modulus_uN_per_m=5", "coupling.scheme=aitken",
-                           "coupling.tolerance=1e-4", "output.every_us=5", "output.fields=false"});
+  const auto scene =
+      read("straight_tube.toml",
+           {"time.step_us=2", "time.end_us=10", "grid.nodes=[21,22,23]", "fluid.density_pg_per_um3=1.1",
+            "fluid.kinematic_viscosity_um2_per_us=0.9", "fluid.convection=false", "cells.0.vertices=1000", "cells.0.mass_pg=7200",
+            "cells.0.reference=spontaneous-angle", "cells.0.interior=empty", "cells.0.shear_modulus_uN_per_m=5", "coupling.scheme=aitken",
+            "coupling.tolerance=1e-4", "output.every_us=5", "output.fields=false"});
   REQUIRE(scene.time.step_us == 2);
   REQUIRE(scene.time.end_us == 10);
   REQUIRE(scene.grid->nodes == std::array{21, 22, 23});

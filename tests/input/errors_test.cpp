@@ -102,9 +102,7 @@ TEST_CASE("wrong values: file, line, key, value and what is allowed") {
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = true", {":13: boundary.0.velocity_mm_per_s = true", "mean speed"}},
       {"velocity_mm_per_s = 2", "velocity_mm_per_s = [1, 2]", {":13: boundary.0.velocity_mm_per_s", "three numbers"}},
       {"\"velocity_inlet\"", "\"inlet\"", {":12: boundary.0.type", "one of \"velocity_inlet\", \"outflow\""}},
-      {"[fluid]",
-       "[output]\nfields = [\"velocty\"]\n[fluid]",
-       {":10: output.fields", "\"velocity\", \"pressure\", \"kind\""}},
+      {"[fluid]", "[output]\nfields = [\"velocty\"]\n[fluid]", {":10: output.fields", "\"velocity\", \"pressure\", \"kind\""}},
       {"[fluid]", "[output]\ncells = true\n[fluid]", {":10: output.cells", "no [[cells]]"}},
   };
   for (const auto& row : rows) require_parts(message(replaced(flow, row.from, row.to)), row.parts);
@@ -162,16 +160,13 @@ TEST_CASE("grid generators take their own keys only") {
   require_parts(grid(swept + "length_um = 3\ncenterline = \"arc\""), {"grid.length_um = 3", "only generator"});
   require_parts(grid(swept), {"grid.centerline: required key is missing", "\"helix\""});
   require_parts(grid(swept + "centerline = \"spline\""), {"grid.points_um: required key is missing"});
-  require_parts(grid(swept + "centerline = \"spline\"\npoints_um = [[0, 0, 0], [0, 0, 1]]"),
-                {":9: grid.points_um", "3 or more rows"});
+  require_parts(grid(swept + "centerline = \"spline\"\npoints_um = [[0, 0, 0], [0, 0, 1]]"), {":9: grid.points_um", "3 or more rows"});
   require_parts(grid(swept + "centerline = \"spline\"\npoints_um = [[0, 0, 0], [0, 0, 0], [0, 0, 1]]"),
                 {":9: grid.points_um", "points 0 and 1 coincide"});
   require_parts(grid(swept + "centerline = \"arc\"\narc_angle_deg = 90\narc_radius_um = 4"),
                 {":10: grid.arc_radius_um = 4", "half the diameter, 5 um"});
-  require_parts(grid(swept + "centerline = \"arc\"\nhelix_turns = 2"),
-                {"grid.helix_turns = 2", "centerline = \"helix\""});
-  require_parts(grid("generator = \"file\"\nfile = \"no_such.h5\""),
-                {":6: grid.file", "no_such.h5", "there is no file"});
+  require_parts(grid(swept + "centerline = \"arc\"\nhelix_turns = 2"), {"grid.helix_turns = 2", "centerline = \"helix\""});
+  require_parts(grid("generator = \"file\"\nfile = \"no_such.h5\""), {":6: grid.file", "no_such.h5", "there is no file"});
   require_parts(grid("generator = \"file\"\nnodes = [5, 5, 5]"), {":6: grid.nodes", "the file decides"});
 }
 
@@ -192,29 +187,23 @@ TEST_CASE("a pressure gradient along a direction that is not periodic is refused
 TEST_CASE("boundaries must make sense together") {
   const auto with = [](const std::string& from, const std::string& to) { return message(replaced(flow, from, to)); };
   require_parts(with("\"j_max\"", "\"j_min\""), {":27: boundary.5.side", "already has a [[boundary]] (boundary.4)"});
-  require_parts(with("[[boundary]]\nside = \"j_max\"\ntype = \"wall\"\n", ""),
-                {":10: boundary: ", "no [[boundary]] for j_max"});
+  require_parts(with("[[boundary]]\nside = \"j_max\"\ntype = \"wall\"\n", ""), {":10: boundary: ", "no [[boundary]] for j_max"});
   require_parts(with("\"outflow\"", "\"wall\""), {":12: boundary.0.type", "no way out"});
   require_parts(with("side = \"i_min\"\ntype = \"wall\"", "side = \"i_min\"\ntype = \"periodic\""),
                 {":19: boundary.2.type", "make i_max periodic as well"});
-  require_parts(with("type = \"outflow\"", "type = \"outflow\"\nramp_us = 3"),
-                {":17: boundary.1.ramp_us = 3", "change with time"});
+  require_parts(with("type = \"outflow\"", "type = \"outflow\"\nramp_us = 3"), {":17: boundary.1.ramp_us = 3", "change with time"});
   require_parts(with("type = \"outflow\"", "type = \"outflow\"\nvelocity_mm_per_s = 3"),
                 {":17: boundary.1.velocity_mm_per_s = 3", "have a velocity"});
   require_parts(with("type = \"outflow\"", "type = \"moving_wall\"\nvelocity_mm_per_s = 3"),
                 {":17: boundary.1.velocity_mm_per_s = 3", "three numbers"});
   const std::string inlet = "velocity_mm_per_s = 2";
-  require_parts(with(inlet, inlet + "\nramp_us = 2\ntime_table = [[0, 0], [1, 1]]"),
-                {":14: boundary.0.ramp_us = 2", "not both"});
-  require_parts(with(inlet, inlet + "\ntime_table = [[1, 0], [1, 1]]"),
-                {":14: boundary.0.time_table", "times must rise"});
+  require_parts(with(inlet, inlet + "\nramp_us = 2\ntime_table = [[0, 0], [1, 1]]"), {":14: boundary.0.ramp_us = 2", "not both"});
+  require_parts(with(inlet, inlet + "\ntime_table = [[1, 0], [1, 1]]"), {":14: boundary.0.time_table", "times must rise"});
   require_parts(with(inlet, inlet + "\nprofile = \"table\""), {"boundary.0.radial_table: required key is missing"});
-  require_parts(with(inlet, inlet + "\nradial_table = [[0, 2], [1, 0]]"),
-                {":14: boundary.0.radial_table", "profile = \"table\""});
+  require_parts(with(inlet, inlet + "\nradial_table = [[0, 2], [1, 0]]"), {":14: boundary.0.radial_table", "profile = \"table\""});
   require_parts(with(inlet, inlet + "\nprofile = \"table\"\nradial_table = [[0, 2], [2, 0]]"),
                 {":15: boundary.0.radial_table", "at most 1"});
-  require_parts(with(inlet, "velocity_mm_per_s = [0, 0, 2]\nprofile = \"parabolic\""),
-                {":14: boundary.0.profile", "give a mean speed"});
+  require_parts(with(inlet, "velocity_mm_per_s = [0, 0, 2]\nprofile = \"parabolic\""), {":14: boundary.0.profile", "give a mean speed"});
   auto tube = replaced(flow, "\"box\"", "\"straight_tube\"");
   tube = replaced(tube, "lower_um = [0, 0, 0]\nupper_um = [4, 4, 4]", "diameter_um = 10\nlength_um = 20");
   require_parts(message(replaced(tube, "side = \"i_min\"\ntype = \"wall\"", "side = \"i_min\"\ntype = \"symmetry\"")),
@@ -261,7 +250,8 @@ TEST_CASE("cells and bodies are checked") {
     require_parts(cell("[coupling]\n" + std::string(key)), {":13: coupling." + std::string(key), "only scheme = \"force\""});
   REQUIRE(cell("membrane_viscosity_N_s_per_m = 1e-7\nviscosity_ratio = 5\n" + force) == "accepted");
   for (const char* key : {"viscosity_ratio = 0.05", "viscosity_ratio = 60"})
-    require_parts(cell(std::string(key) + "\n" + force), {":12: cells.0." + std::string(key), "from 0.1 to 50", "inside over that outside"});
+    require_parts(cell(std::string(key) + "\n" + force),
+                  {":12: cells.0." + std::string(key), "from 0.1 to 50", "inside over that outside"});
   require_parts(cell("viscosity_ratio = 5"), {":12: cells.0.viscosity_ratio", "coupling.scheme = \"force\"", "no fluid inside"});
   require_parts(cell("start_stretch = [1, 3, 1]"), {":12: cells.0.start_stretch", "from 0.5 to 2"});
   require_parts(cell("[coupling]\nscheme = \"iterated\"\ntolerance = 1"), {":14: coupling.tolerance = 1", "from 1e-12 to 0.5"});
@@ -296,7 +286,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(blood("from_us = 1e9"), {":15: blood.from_us", "time.end_us", "begin earlier"});
   require_parts(blood("sample_every_us = 1e9"), {":15: blood.sample_every_us", "no sample, of those"});
   require_parts(blood("from_us = 9\nsample_every_us = 4"), {":16: blood.sample_every_us", "no sample"});
-  REQUIRE(blood("from_us = 7\nsample_every_us = 4") == "accepted");  // at 8 us
+  REQUIRE(blood("from_us = 7\nsample_every_us = 4") == "accepted");      // at 8 us
   REQUIRE(blood("from_us = 9.5\nsample_every_us = 4.6") == "accepted");  // of 9.2 us, at 10: the first step that has come to it
   require_parts(blood("from_ms = 1"), {":15: blood.from_ms", "did you mean 'from_us'?"});
   require_parts(message(flow + "\n[output]\nfields = [\"wall_stress\"]\n"), {"output.fields", "\"wall_shear_stress\""});
@@ -310,8 +300,7 @@ TEST_CASE("cells and bodies are checked") {
   require_parts(body("shape = \"sphere\""), {":10: bodies.0.radius_um: required key is missing"});
   require_parts(body("shape = \"sphere\"\nradius_um = 1\nsemi_axes_um = [1, 1, 1]"),
                 {":14: bodies.0.semi_axes_um", "shape = \"ellipsoid\""});
-  require_parts(body("shape = \"ellipsoid\"\nsemi_axes_um = [1, 1, -1]"),
-                {":13: bodies.0.semi_axes_um", "each a number above 0"});
+  require_parts(body("shape = \"ellipsoid\"\nsemi_axes_um = [1, 1, -1]"), {":13: bodies.0.semi_axes_um", "each a number above 0"});
   require_parts(body("shape = \"sphere\"\nradius_um = 1\nvertices = 5"), {":14: bodies.0.vertices = 5", "42"});
   require_parts(body("shape = \"sphere\"\nradius_um = 1\nvelocity_um_per_us = [0, 0, 1]"),
                 {":14: bodies.0.velocity_um_per_us", "did you mean 'velocity_mm_per_s'?"});
@@ -353,7 +342,8 @@ TEST_CASE("shapes, laws and resting states of cells take their own keys only") {
   require_parts(cell(skalak + "skalak_c = -1"), {":13: cells.0.skalak_c = -1", "from 0 to"});
   REQUIRE(cell(skalak + "local_area_modulus_uN_per_m = 0") == "accepted");
   require_parts(cell("reference_reduced_volume = 0.95"), {":12: cells.0.reference_reduced_volume", "only reference = \"spheroid\""});
-  require_parts(cell("reference = \"spheroid\"\nreference_reduced_volume = 0.6"), {":13: cells.0.reference_reduced_volume = 0.6", "0.65 to 1"});
+  require_parts(cell("reference = \"spheroid\"\nreference_reduced_volume = 0.6"),
+                {":13: cells.0.reference_reduced_volume = 0.6", "0.65 to 1"});
   require_parts(cell(sphere + "reference = \"spheroid\""), {":14: cells.0.reference", "only the built-in biconcave shape", "leave out"});
   require_parts(cell("inflation = 0.1"), {":12: cells.0.inflation = 0.1", "only shape = \"sphere\""});
   require_parts(cell(sphere + "inflation = -0.1"), {":14: cells.0.inflation = -0.1", "from 0 to 1"});
@@ -383,9 +373,11 @@ TEST_CASE("cell types are checked") {
   require_parts(types(rbc + "vertices = 100\n"), {":11: cell_types.0.vertices = 100", "from 200 to 30000"});
   require_parts(types(rbc + "center_um = [0, 0, 0]\n"), {":11: cell_types.0.center_um", "in the [[cells]] entry"});
   require_parts(types(rbc + "vertexes = 300\n"), {":11: cell_types.0.vertexes", "did you mean 'vertices'?"});
-  require_parts(types(rbc + cell, {"cells.0.type=rcb"}), {"--set cells.0.type=rcb", "unknown cell type; known: \"rbc\"", "did you mean \"rbc\"?"});
+  require_parts(types(rbc + cell, {"cells.0.type=rcb"}),
+                {"--set cells.0.type=rcb", "unknown cell type; known: \"rbc\"", "did you mean \"rbc\"?"});
   require_parts(types(cell), {":10: cells.0.type = \"rbc\"", "no [[cell_types]]", "leave out type"});
-  require_parts(types(rbc + cell + "vertices = 300\n"), {":14: cells.0.vertices = 300", "cell's type, \"rbc\"", "set cell_types.0.vertices"});
+  require_parts(types(rbc + cell + "vertices = 300\n"),
+                {":14: cells.0.vertices = 300", "cell's type, \"rbc\"", "set cell_types.0.vertices"});
   require_parts(types(rbc + cell + "mass_pg = 100\n"), {"cells.0.mass_pg", "set cell_types.0.mass_pg"});
   require_parts(types(rbc + cell + "spin = 300\n"), {"cells.0.spin", "unknown key; did you mean 'spin_deg'?"});
   require_parts(types(rbc + cell + "zzzz = 1\n"), {"cells.0.zzzz", "unknown key; known here: type, center_um, axis, spin_deg"});
@@ -415,13 +407,15 @@ TEST_CASE("populations are checked") {
   require_parts(with(rbc + "count = 3\nhematcrit = 0.3\n"), {"populations.0.hematcrit", "did you mean 'hematocrit'?"});
   const auto surface = (fs::temp_directory_path() / "corpuscle_packed.off").string();
   std::ofstream(surface) << "read later\n";
-  require_parts(with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", "name = \"rbc\"\nmesh = \"" + surface + "\"\nrecenter = false\n")),
-                {"cell_types.0.recenter", "by the centroid", "leave it out"});
+  require_parts(
+      with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", "name = \"rbc\"\nmesh = \"" + surface + "\"\nrecenter = false\n")),
+      {"cell_types.0.recenter", "by the centroid", "leave it out"});
   const std::string viscous = "name = \"rbc\"\nviscosity_ratio = 5\nmembrane_viscosity_N_s_per_m = 5e-7\n";
   REQUIRE(with(rbc + "count = 3\n", replaced(start, "name = \"rbc\"\n", viscous)) == "accepted");
   require_parts(with(rbc + "count = 3\n", "[[cell_types]]\nname = \"rbc\"\n[[populations]]\n"),
                 {"populations.0", "coupling.scheme = \"force\"", "[[cells]]"});
-  require_parts(with(rbc + "count = 3\n", "[coupling]\nscheme = \"force\"\n[[populations]]\n"), {"populations.0.type", "no [[cell_types]]"});
+  require_parts(with(rbc + "count = 3\n", "[coupling]\nscheme = \"force\"\n[[populations]]\n"),
+                {"populations.0.type", "no [[cell_types]]"});
 }
 
 TEST_CASE("a long value is shortened in a message") {
@@ -434,14 +428,12 @@ TEST_CASE("a long value is shortened in a message") {
 }
 
 TEST_CASE("modules that contradict each other are refused") {
-  require_parts(message(flow + "[[cells]]\ncenter_um = [0, 0, 0]\n[stretching]\n"),
-                {":9: fluid: a stretching test has no fluid"});
+  require_parts(message(flow + "[[cells]]\ncenter_um = [0, 0, 0]\n[stretching]\n"), {":9: fluid: a stretching test has no fluid"});
   require_parts(message("[stretching]\n"), {":1: stretching: a stretching test pulls one cell; the case has 0"});
   require_parts(message("[[cells]]\n[stretching]\n[time]\nstep_us = 1\nend_us = 1\n"), {":3: time: ", "has no [time]"});
   require_parts(message("[[cells]]\n[stretching]\nforce_N = 1\n"), {":3: stretching.force_N", "'force_pN'"});
   require_parts(message("[[cells]]\n[stretching]\npatch_fraction = 0.6\n"), {":3: stretching.patch_fraction = 0.6"});
-  require_parts(message("[[cells]]\n[stretching]\n[output]\nfields = true\n"),
-                {":4: output.fields = true", "no [fluid]"});
+  require_parts(message("[[cells]]\n[stretching]\n[output]\nfields = true\n"), {":4: output.fields = true", "no [fluid]"});
   require_parts(message("[[cells]]\n"), {":1: cells: nothing to compute"});
   require_parts(message("[[bodies]]\nshape = \"sphere\"\nradius_um = 1\ncenter_um = [0, 0, 0]\n"),
                 {":1: bodies: rigid bodies need a [fluid]"});

@@ -91,10 +91,18 @@ TEST_CASE("keys are listed with default, range and where they belong") {
   CHECK_THAT(find("coupling", "kernel")->only, Contains("force"));
   CHECK_THAT(find("coupling", "robin_coefficient_pg_per_um2_per_us")->only, Contains("force"));
   CHECK(find("boundary", "side")->only.empty());
-  for (const auto& [section, key] : {std::pair{"fluid", "convection"}, {"output", "fields"}, {"boundary", "velocity_mm_per_s"},
-                                     {"coupling", "robin_coefficient_pg_per_um2_per_us"}, {"stretching", "experiment"}, {"blood", "from_us"}, {"blood", "bins"}, {"output", "cells_in_history"}, {"bodies", "semi_axes_um"}})
+  for (const auto& [section, key] : {std::pair{"fluid", "convection"},
+                                     {"output", "fields"},
+                                     {"boundary", "velocity_mm_per_s"},
+                                     {"coupling", "robin_coefficient_pg_per_um2_per_us"},
+                                     {"stretching", "experiment"},
+                                     {"blood", "from_us"},
+                                     {"blood", "bins"},
+                                     {"output", "cells_in_history"},
+                                     {"bodies", "semi_axes_um"}})
     CHECK(find(section, key));
-  CHECK_THAT(keys_text("grid"), Contains("[grid]") && Contains("length_um: Length of the tube") && Contains("a number above 0") && !Contains("[fluid]"));
+  CHECK_THAT(keys_text("grid"),
+             Contains("[grid]") && Contains("length_um: Length of the tube") && Contains("a number above 0") && !Contains("[fluid]"));
   CHECK_THAT(keys_text(""), Contains("[[cells]]") && Contains("title"));
   CHECK_THROWS_WITH(keys_text("gird"), Contains("did you mean 'grid'?"));
 }

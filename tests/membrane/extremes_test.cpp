@@ -12,9 +12,7 @@ TEST_CASE("a vertex that is not a number shows in a cell's extents and stretch, 
   Membranes membranes({cell_settings(200)});
   const auto& m = membranes.views();
   const Table<double> table("corpuscle::test::table", 1, CellColumn::count);
-  const auto value = [&](int column) {
-    return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table)(0, column);
-  };
+  const auto value = [&](int column) { return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), table)(0, column); };
   RelaxationViews work;
   work.force = Components<double>("corpuscle::test::force", m.vertices, 3);
   Kokkos::deep_copy(work.force, 2.0);

@@ -66,9 +66,7 @@ struct HookeanSpring {
   static constexpr double limit = 3;
   double stiffness = 0;
   KOKKOS_INLINE_FUNCTION double force(double length, double rest) const { return stiffness * (length - rest); }
-  KOKKOS_INLINE_FUNCTION double energy(double length, double rest) const {
-    return 0.5 * stiffness * (length - rest) * (length - rest);
-  }
+  KOKKOS_INLINE_FUNCTION double energy(double length, double rest) const { return 0.5 * stiffness * (length - rest) * (length - rest); }
   KOKKOS_INLINE_FUNCTION static double strain(double length, double rest) { return length / rest; }
   KOKKOS_INLINE_FUNCTION static double stiffening(double, double) { return 1; }
 };
@@ -140,8 +138,7 @@ void check_law(const Law& law) {
 }  // namespace
 
 TEST_CASE("every force is minus the gradient of its energy") {
-  const auto term =
-      GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
+  const auto term = GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
   CellSettings settings = cell_settings(300);
   settings.reference = GENERATE(CellSettings::Reference::shape, CellSettings::Reference::uniform);
   OneCell cell(settings, term);
@@ -185,7 +182,8 @@ TEST_CASE("a triangle that is squeezed flat, and through itself, is pushed open,
     for (int vertex : corner)
       for (int d = 0; d < 3; ++d) {
         const double slope = (8 * (cell.energy_at(vertex, d, h) - cell.energy_at(vertex, d, -h)) -
-                              (cell.energy_at(vertex, d, 2 * h) - cell.energy_at(vertex, d, -2 * h))) / (12 * h);
+                              (cell.energy_at(vertex, d, 2 * h) - cell.energy_at(vertex, d, -2 * h))) /
+                             (12 * h);
         error = std::max(error, std::abs(slope + force[vertex][d]));
         scale = std::max(scale, std::abs(slope));
       }
@@ -198,8 +196,7 @@ TEST_CASE("a triangle that is squeezed flat, and through itself, is pushed open,
 }
 
 TEST_CASE("internal forces of a deformed cell exert no net force or torque") {
-  const auto term =
-      GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
+  const auto term = GENERATE(Term::springs, Term::bending, Term::global_area, Term::local_area, Term::volume, Term::all);
   OneCell cell(cell_settings(500), term);
   cell.elasticity->membrane_forces(cell.views, cell.views.surface.x, cell.views.force);
   const auto force = to_host(cell.views.force, cell.views.vertices);

@@ -49,11 +49,7 @@ std::array<double, 3> tension(const CellSettings& settings, const Deformation& d
     for (Vec3& n : state.other_normal) n = {0, 0, 1};
     state.area = 0.5 * cross(state.corner[1], state.corner[2]).z;
     Vec3 force[3];
-    std::visit(
-        [&](const auto& in_plane) {
-          triangle_forces(state, rest, law, in_plane, {0, 0}, force);
-        },
-        reference.in_plane);
+    std::visit([&](const auto& in_plane) { triangle_forces(state, rest, law, in_plane, {0, 0}, force); }, reference.in_plane);
     for (int k = 0; k < 3; ++k) {
       sum[0] -= force[k].x * state.corner[k].x;
       sum[1] -= force[k].x * state.corner[k].y;
@@ -123,8 +119,7 @@ TEST_CASE("the modulus of area is G (1 + 2 C) of a Skalak sheet and 3 G of a neo
     CHECK(t[0] == Approx(t[2]).epsilon(1e-9));
     return t[0] / (2 * strain);
   };
-  for (double c : {0.0, 1.0, 10.0, 1000.0})
-    CHECK(modulus(with_law(Law::skalak, c)) == Approx(G * (1 + 2 * c)).epsilon(1e-4));
+  for (double c : {0.0, 1.0, 10.0, 1000.0}) CHECK(modulus(with_law(Law::skalak, c)) == Approx(G * (1 + 2 * c)).epsilon(1e-4));
   CHECK(modulus(with_law(Law::neo_hookean)) == Approx(3 * G).epsilon(1e-4));
 }
 
@@ -167,8 +162,8 @@ TEST_CASE("a Skalak triangle has the energy of its principal stretches, whatever
 }
 
 TEST_CASE("cells of several laws and constants in one scene have the forces that each has alone") {
-  std::vector<CellSettings> cells{with_law(Law::neo_hookean), with_law(Law::wlc_pow), with_law(Law::skalak, 10),
-                                  with_law(Law::wlc_pow), with_law(Law::neo_hookean)};
+  std::vector<CellSettings> cells{with_law(Law::neo_hookean), with_law(Law::wlc_pow), with_law(Law::skalak, 10), with_law(Law::wlc_pow),
+                                  with_law(Law::neo_hookean)};
   cells[3].shear_modulus_uN_per_m = 20;
   const auto together = forces_of(cells);
   for (std::size_t c = 0; c < cells.size(); ++c) {

@@ -91,21 +91,21 @@ TEST_CASE("dialects of OFF are read") {
   const std::string coloured = replaced(vertices, "\n", " 255 0 0 255\n");
   for (const std::string& text : {
            "OFF\n4 4 6\n" + vertices + faces,
-           "# made by hand\n\n# twice\nOFF\n4 4 6\n" + vertices + faces,         // comments first
-           "OFF 4 4 6\n" + vertices + faces,                                     // counts beside the keyword
-           "OFF\n4 4\n" + vertices + faces,                                      // no edges
-           "OFF\n4\n4\n6\n" + vertices + faces,                                  // each count on its line
-           "off\n4 4 6\n" + vertices + faces,                                    // lower case
-           "COFF\n4 4 6\n" + coloured + faces,                                   // colours of vertices
-           "NOFF\n4 4 6\n" + replaced(vertices, "\n", " 0 0 1\n") + faces,       // normals
+           "# made by hand\n\n# twice\nOFF\n4 4 6\n" + vertices + faces,    // comments first
+           "OFF 4 4 6\n" + vertices + faces,                                // counts beside the keyword
+           "OFF\n4 4\n" + vertices + faces,                                 // no edges
+           "OFF\n4\n4\n6\n" + vertices + faces,                             // each count on its line
+           "off\n4 4 6\n" + vertices + faces,                               // lower case
+           "COFF\n4 4 6\n" + coloured + faces,                              // colours of vertices
+           "NOFF\n4 4 6\n" + replaced(vertices, "\n", " 0 0 1\n") + faces,  // normals
            "CNOFF\n4 4 6\n" + replaced(vertices, "\n", " 0 0 1 0.5 0.5 0.5 1\n") + faces,
-           "STOFF\n4 4 6\n" + replaced(vertices, "\n", " 0.5 0.5\n") + faces,    // texture coordinates
-           "OFF\n4 4 6\n" + coloured + faces,                                    // attributes that are not announced
-           "OFF\n4 4 6\n" + vertices + replaced(faces, "\n", " 10 20 30\n"),     // colours of faces
-           "\xEF\xBB\xBFOFF\n4 4 6\n" + vertices + faces,                        // byte order mark
-           replaced("OFF\n4 4 6\n" + vertices + faces, "\n", "\r\n"),            // line ends of other systems
+           "STOFF\n4 4 6\n" + replaced(vertices, "\n", " 0.5 0.5\n") + faces,  // texture coordinates
+           "OFF\n4 4 6\n" + coloured + faces,                                  // attributes that are not announced
+           "OFF\n4 4 6\n" + vertices + replaced(faces, "\n", " 10 20 30\n"),   // colours of faces
+           "\xEF\xBB\xBFOFF\n4 4 6\n" + vertices + faces,                      // byte order mark
+           replaced("OFF\n4 4 6\n" + vertices + faces, "\n", "\r\n"),          // line ends of other systems
            replaced("OFF\n4 4 6\n" + vertices + faces, "\n", "\r"),
-           "OFF\n4 4 6\n0 0 0 1 0 0\n0 1 0\n0 0 1\n" + faces,                    // not a line each
+           "OFF\n4 4 6\n0 0 0 1 0 0\n0 1 0\n0 0 1\n" + faces,  // not a line each
            "OFF\n4 4 6\n" + replaced(vertices, "1", "+1.0e0") + faces,
        }) {
     INFO(text);
@@ -229,9 +229,7 @@ TEST_CASE("damaged mesh files: what is wrong, and in which line") {
 TEST_CASE("truncated and foreign mesh files are refused") {
   const TemporaryFile file("bad");
   const TriangleMesh mesh = ellipsoid_mesh({1, 1, 1}, 42);
-  const auto cut = [&](std::size_t bytes) {
-    std::filesystem::resize_file(file.path, std::filesystem::file_size(file.path) - bytes);
-  };
+  const auto cut = [&](std::size_t bytes) { std::filesystem::resize_file(file.path, std::filesystem::file_size(file.path) - bytes); };
   SECTION("OFF cut short") {
     write_off(file.path, mesh);
     cut(200);

@@ -12,9 +12,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-TriangleMesh tetrahedron() {
-  return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
-}
+TriangleMesh tetrahedron() { return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}}; }
 
 void append(TriangleMesh& mesh, const TriangleMesh& other) {
   const int shift = int(mesh.vertices.size());
@@ -23,8 +21,7 @@ void append(TriangleMesh& mesh, const TriangleMesh& other) {
 }
 
 void refused(const TriangleMesh& mesh, const std::string& what, const std::string& where) {
-  CHECK_THROWS_MATCHES(check_closed_surface(mesh, "cell.off"), InputError,
-                       Catch::Matchers::Predicate<InputError>([&](const InputError& e) {
+  CHECK_THROWS_MATCHES(check_closed_surface(mesh, "cell.off"), InputError, Catch::Matchers::Predicate<InputError>([&](const InputError& e) {
                          const std::string text = e.what();
                          INFO(text);
                          return text.find(what) != std::string::npos && text.find(where) != std::string::npos &&

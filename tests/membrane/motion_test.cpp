@@ -54,13 +54,9 @@ std::vector<Vec3> rough_field(const Membranes& m, double size) {
 
 SurfaceStress rough_traction(const Membranes& m, double size) { return make_stress(rough_field(m, size)); }
 
-Components<double> uniform_field(const Membranes& m, const Vec3& value) {
-  return make_field(std::vector<Vec3>(m.vertices(), value));
-}
+Components<double> uniform_field(const Membranes& m, const Vec3& value) { return make_field(std::vector<Vec3>(m.vertices(), value)); }
 
-SurfaceStress uniform_traction(const Membranes& m, const Vec3& value) {
-  return make_stress(std::vector<Vec3>(m.vertices(), value));
-}
+SurfaceStress uniform_traction(const Membranes& m, const Vec3& value) { return make_stress(std::vector<Vec3>(m.vertices(), value)); }
 
 }  // namespace
 
@@ -264,8 +260,7 @@ TEST_CASE("a cell that cannot hold stops the run and stays where it was") {
   SECTION("overstretched") {
     std::vector<Vec3> pull;
     for (const Vec3& p : to_host(m.surfaces().x, m.vertices())) pull.push_back({100 * p.x, 0, 0});
-    CHECK_THROWS_WITH(m.advance(1.0, make_stress(pull)),
-                      Contains("cells.0") && Contains("overstretched") && Contains("time.step_us"));
+    CHECK_THROWS_WITH(m.advance(1.0, make_stress(pull)), Contains("cells.0") && Contains("overstretched") && Contains("time.step_us"));
     CHECK(same_place());
   }
   SECTION("not a number") {

@@ -100,8 +100,8 @@ TEST_CASE("a cell whose sheet rests on a spheroid is a biconcave disc at rest, o
   REQUIRE(r.relaxed);
   CHECK(r.relaxed->biconcave());
   report("v {}, law {}: {} iterations, {:.2f} um, {:.2f} at the centre, {:.2f} at most, dimples {:.2f} {:.2f}", v, int(law),
-         r.relaxed->iterations, r.relaxed->diameter, r.relaxed->thickness_center, r.relaxed->thickness_max,
-         r.relaxed->dimple[0], r.relaxed->dimple[1]);
+         r.relaxed->iterations, r.relaxed->diameter, r.relaxed->thickness_center, r.relaxed->thickness_max, r.relaxed->dimple[0],
+         r.relaxed->dimple[1]);
   // Measured cells (Evans & Fung 1972): 7.82 +- 0.62 um wide, 0.81 +- 0.35 and 2.58 +- 0.27 um thick.
   CHECK(r.relaxed->diameter == Approx(7.82).margin(0.62));
   CHECK(r.relaxed->thickness_center == Approx(0.81).margin(0.35));

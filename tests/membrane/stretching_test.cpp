@@ -22,15 +22,12 @@ struct CheckedRow {
 
 /// An independent code's diameters, um, on meshes of its own.
 const std::vector<CheckedRow>& checked(int vertices) {
-  static const std::vector<CheckedRow> v500 = {{0, 7.80, 7.81},   {1, 9.31, 7.22},   {2, 10.15, 6.82},
-                                               {4, 11.58, 6.20},  {6, 12.74, 5.79},  {8, 13.65, 5.52},
-                                               {10, 14.37, 5.31}, {12, 14.95, 5.13}, {15, 15.63, 4.90}};
-  static const std::vector<CheckedRow> v1000 = {{0, 7.81, 7.81},   {1, 9.32, 7.21},   {2, 10.18, 6.80},
-                                                {4, 11.60, 6.17},  {6, 12.76, 5.74},  {8, 13.68, 5.46},
-                                                {10, 14.41, 5.23}, {12, 15.00, 5.03}, {15, 15.70, 4.77}};
-  static const std::vector<CheckedRow> v3000 = {{0, 7.82, 7.81},   {1, 9.32, 7.22},   {2, 10.18, 6.82},
-                                                {4, 11.60, 6.20},  {6, 12.77, 5.79},  {8, 13.70, 5.51},
-                                                {10, 14.44, 5.30}, {12, 15.04, 5.12}, {15, 15.75, 4.88}};
+  static const std::vector<CheckedRow> v500 = {{0, 7.80, 7.81},  {1, 9.31, 7.22},   {2, 10.15, 6.82},  {4, 11.58, 6.20}, {6, 12.74, 5.79},
+                                               {8, 13.65, 5.52}, {10, 14.37, 5.31}, {12, 14.95, 5.13}, {15, 15.63, 4.90}};
+  static const std::vector<CheckedRow> v1000 = {{0, 7.81, 7.81},  {1, 9.32, 7.21},   {2, 10.18, 6.80},  {4, 11.60, 6.17}, {6, 12.76, 5.74},
+                                                {8, 13.68, 5.46}, {10, 14.41, 5.23}, {12, 15.00, 5.03}, {15, 15.70, 4.77}};
+  static const std::vector<CheckedRow> v3000 = {{0, 7.82, 7.81},  {1, 9.32, 7.22},   {2, 10.18, 6.82},  {4, 11.60, 6.20}, {6, 12.77, 5.79},
+                                                {8, 13.70, 5.51}, {10, 14.44, 5.30}, {12, 15.04, 5.12}, {15, 15.75, 4.88}};
   return vertices == 500 ? v500 : (vertices == 1000 ? v1000 : v3000);
 }
 
@@ -44,8 +41,8 @@ TEST_CASE("stretching follows the checked curve and the experiment") {
   Kokkos::Timer timer;
   const StretchingResult r = stretch_cell(m, settings);
   const double seconds = timer.seconds();
-  INFO(vertices << " vertices, " << seconds << " s on " << Exec().concurrency() << " threads of "
-                << std::thread::hardware_concurrency() << " processors");
+  INFO(vertices << " vertices, " << seconds << " s on " << Exec().concurrency() << " threads of " << std::thread::hardware_concurrency()
+                << " processors");
   REQUIRE(r.steps.size() == 16);
   CHECK(r.patch_vertices == vertices / 50);
   for (const CheckedRow& row : checked(vertices)) {
@@ -70,8 +67,8 @@ TEST_CASE("stretching follows the checked curve and the experiment") {
   CHECK(e.rms_axial_um < 0.30);
   CHECK(e.rms_transverse_um < 0.78);
   if (vertices == 500) CHECK(seconds < 10);  // the bound asked for on two threads
-  report("{} vertices: {:.2f} s, rms {:.3f} / {:.3f} um, at rest {:.3f} {:.3f} {:.3f} um", vertices, seconds,
-         e.rms_axial_um, e.rms_transverse_um, r.rest.diameter_um, r.rest.thickness_center_um, r.rest.thickness_max_um);
+  report("{} vertices: {:.2f} s, rms {:.3f} / {:.3f} um, at rest {:.3f} {:.3f} {:.3f} um", vertices, seconds, e.rms_axial_um,
+         e.rms_transverse_um, r.rest.diameter_um, r.rest.thickness_center_um, r.rest.thickness_max_um);
   for (const CheckedRow& row : checked(vertices)) {
     const StretchingStep& step = r.steps[row.step];
     report("{:.1f} pN: {:.2f} / {:.2f} um", step.force_pN, step.axial_um, step.transverse_um);
@@ -150,8 +147,8 @@ TEST_CASE("a membrane too soft for the force is called that, though it rests") {
   auto soft = cell_settings(200);
   soft.shear_modulus_uN_per_m = 1e-3;
   Membranes m({soft});
-  CHECK_THROWS_WITH(stretch_cell(m, settings), Contains("of its contour length") && Contains("cells.0.shear_modulus_uN_per_m") &&
-                                                   !Contains("not at rest"));
+  CHECK_THROWS_WITH(stretch_cell(m, settings),
+                    Contains("of its contour length") && Contains("cells.0.shear_modulus_uN_per_m") && !Contains("not at rest"));
 }
 
 TEST_CASE("how far the curve may lie from the lines between computed forces") {

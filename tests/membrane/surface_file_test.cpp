@@ -296,8 +296,9 @@ TEST_CASE("surfaces that do not cross themselves are left alone, of whatever tri
   CHECK_FALSE(find_self_crossing(scaled(octasphere(4), {1, 1, 1e-3})));  // what is above lies over what is below, and near it
   CHECK_FALSE(find_self_crossing(moved(scaled(octasphere(4), {1, 1, 9}), {1e4, 0, 0})));
   // A cube of twelve triangles, one of them cut into 3000: very unlike sizes.
-  TriangleMesh cube{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
-                    {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}}};
+  TriangleMesh cube{
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+      {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}}};
   for (int cut = 0; cut < 1000; ++cut) {
     const auto t = cube.triangles[3];
     Triple m{};

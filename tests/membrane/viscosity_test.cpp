@@ -43,7 +43,8 @@ std::pair<std::vector<Vec3>, std::vector<double>> shares_of_vertices(const Trian
 }
 
 /// What a membrane at rest gives a fluid that takes `drag` nN for each area and velocity and whose pressure lets none of it through,
-/// under a load that grows from nothing within `steps`; it takes the fluid's answer for `beta` and a share of its own viscosity, of whose changes `ahead` is carried on in time.
+/// under a load that grows from nothing within `steps`; it takes the fluid's answer for `beta` and a share of its own viscosity, of whose
+/// changes `ahead` is carried on in time.
 std::vector<Vec3> given_to_drag(const std::vector<Vec3>& load, double drag, int steps, double beta, double share, double ahead) {
   Membranes m(find_cell_types({viscous(CellSettings::Dissipation::central, 5e-7)}).references, std::make_shared<Workspace>());
   m.hold({{0, 0}}, 1);
@@ -67,8 +68,7 @@ std::vector<Vec3> given_to_drag(const std::vector<Vec3>& load, double drag, int 
       through += dot(gradient[i], given[i]) / area[i];
       square += dot(gradient[i], gradient[i]) / area[i];
     }
-    for (std::size_t i = 0; i < given.size(); ++i)
-      velocity[i] = (1 / (drag * area[i])) * (given[i] - (through / square) * gradient[i]);
+    for (std::size_t i = 0; i < given.size(); ++i) velocity[i] = (1 / (drag * area[i])) * (given[i] - (through / square) * gradient[i]);
   }
   return given;
 }

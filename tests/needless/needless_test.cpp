@@ -2,11 +2,11 @@
 // and everything that is launched or allocated has a label.
 #include <catch2/catch.hpp>
 
+#include <unistd.h>
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
-#include <unistd.h>
 
 #include "app/flow_output.hpp"
 #include "app/modules.hpp"
@@ -28,28 +28,28 @@ const std::map<std::string, std::vector<std::string>> labels_of = {
     {"immersed search", {"corpuscle::immersed::"}},
     {"rigid bodies", {"corpuscle::immersed::rigid_motion"}},
     {"membrane", {"corpuscle::membrane::"}},
-    {"membrane viscosity",
-     {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve"}},
+    {"membrane viscosity", {"corpuscle::membrane::assemble_viscous", "corpuscle::membrane::viscous_solve"}},
     {"transfer of forces", {"corpuscle::transfer::"}},
-    {"slip correction", {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::transfer::slip_power",
-                         "corpuscle::membrane::stiffening", "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"}},
+    {"slip correction",
+     {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::transfer::slip_power",
+      "corpuscle::membrane::stiffening", "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"}},
     {"sharp pressure", {"corpuscle::transfer::jump"}},
     {"viscosity ratio", {"corpuscle::transfer::inside", "corpuscle::fluid::excess"}},
     {"contact", {"corpuscle::contact::"}},
-    {"blood statistics", {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge",
-                          "corpuscle::blood::wall_force", "corpuscle::blood::find_bins", "corpuscle::blood::edge"}},
+    {"blood statistics",
+     {"corpuscle::blood::cell_flow", "corpuscle::blood::profile", "corpuscle::blood::core_edge", "corpuscle::blood::wall_force",
+      "corpuscle::blood::find_bins", "corpuscle::blood::edge"}},
     {"packing", {"corpuscle::transfer::scale_forces"}},
-    {"coupling", {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
-                  "corpuscle::cells::measure_boxes"}},
+    {"coupling",
+     {"corpuscle::coupling::traction", "corpuscle::coupling::v_interface", "corpuscle::coupling::residual", "corpuscle::coupling::predict",
+      "corpuscle::cells::measure_boxes"}},
     {"halo exchange between ranks", {"corpuscle::halo::pack", "corpuscle::halo::unpack", "corpuscle::halo::send"}},
     {"field output", {"corpuscle::output::gather"}},
 };
 
 struct Counts {
   std::map<std::string, int> kernels, allocations;
-  int of(const std::string& prefix) const {
-    return Recorder::matching(kernels, prefix) + Recorder::matching(allocations, prefix);
-  }
+  int of(const std::string& prefix) const { return Recorder::matching(kernels, prefix) + Recorder::matching(allocations, prefix); }
 };
 
 void check_labels(const Counts& counts) {
@@ -94,8 +94,8 @@ std::string case_file(const std::string& name) { return CORPUSCLE_SOURCE_DIR "/c
 /// Set up and run a few steps with all output, then three more that must not allocate. @param second_cell_um  how far
 /// ahead of the first a second cell is; 0: none
 void check_flow(const std::string& name, std::vector<std::string> overrides, double second_cell_um = 0) {
-  overrides.insert(overrides.end(), {"time.step_us=1", "time.end_us=20", "output.every_us=2", "output.history_every_us=0",
-                                     "output.checkpoint_every_us=0"});
+  overrides.insert(overrides.end(),
+                   {"time.step_us=1", "time.end_us=20", "output.every_us=2", "output.history_every_us=0", "output.checkpoint_every_us=0"});
   Case scene = read_case(case_file(name), overrides);
   if (second_cell_um > 0) {
     scene.cells.push_back(scene.cells[0]);
@@ -124,9 +124,8 @@ void check_flow(const std::string& name, std::vector<std::string> overrides, dou
   INFO(name);
   check_labels(all);
   check_modules(scene, all);
-  const bool periodic = std::any_of(scene.boundaries.begin(), scene.boundaries.end(), [](const BoundarySettings& side) {
-    return side.type == BoundarySettings::Type::periodic;
-  });
+  const bool periodic = std::any_of(scene.boundaries.begin(), scene.boundaries.end(),
+                                    [](const BoundarySettings& side) { return side.type == BoundarySettings::Type::periodic; });
   const std::size_t bodies = scene.cells.size() + scene.bodies.size();
   const bool force = scene.coupling && scene.coupling->scheme == CouplingSettings::Scheme::force;
   if (!force) CHECK((all.of("corpuscle::immersed::least_gap") > 0) == (bodies > 1 || (bodies == 1 && periodic)));
@@ -195,8 +194,7 @@ TEST_CASE("a step launches no more kernels than it needs", "[needless]") {
 }
 
 TEST_CASE("what is left out would have cost what the program says", "[needless]") {
-  const auto check = [](const char* module, const std::vector<std::string>& labels, const Case& without,
-                        const Case& with) {
+  const auto check = [](const char* module, const std::vector<std::string>& labels, const Case& without, const Case& with) {
     const ModuleCost said = list_modules(without, 1).cost.at(module);
     const Price less = price(without, labels), more = price(with, labels);
     INFO(module << ": " << more.kernels - less.kernels << " kernels, " << more.megabytes - less.megabytes << " MB");
@@ -205,11 +203,12 @@ TEST_CASE("what is left out would have cost what the program says", "[needless]"
   };
   check("convection", {"corpuscle::fluid::convection", "corpuscle::fluid::extrapolate", "corpuscle::fluid::flux_"},
         small("tube_flow", {"fluid.convection=false"}), small("tube_flow", {}));
-  check("membrane viscosity", {"corpuscle::membrane::"},
-        small("straight_tube", {"cells.0.membrane_viscosity_N_s_per_m=0"}), small("straight_tube", {}));
+  check("membrane viscosity", {"corpuscle::membrane::"}, small("straight_tube", {"cells.0.membrane_viscosity_N_s_per_m=0"}),
+        small("straight_tube", {}));
 
-  check("slip correction", {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::membrane::stiffening",
-                             "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"},
+  check("slip correction",
+        {"corpuscle::transfer::add_slip", "corpuscle::transfer::limit_slip", "corpuscle::membrane::stiffening",
+         "corpuscle::coupling::stiffening", "corpuscle::coupling::followed"},
         bare_capsule({"coupling.slip=false"}), bare_capsule({"coupling.slip=true"}));
 
   Case sphere = small("tube_flow", {});
@@ -231,9 +230,7 @@ TEST_CASE("what is left out would have cost what the program says", "[needless]"
 TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothing new in a step", "[needless]") {
   const std::string tube = "grid.nodes=[17,17,25]";
   SECTION("tube flow") { check_flow("tube_flow", {tube}); }
-  SECTION("tube flow without convection and fields") {
-    check_flow("tube_flow", {tube, "fluid.convection=false", "output.fields=false"});
-  }
+  SECTION("tube flow without convection and fields") { check_flow("tube_flow", {tube, "fluid.convection=false", "output.fields=false"}); }
   SECTION("tube flow on a skewed grid") { check_flow("tube_flow", {tube, "grid.cross_section=elliptical"}); }
   SECTION("Couette flow") { check_flow("couette", {}); }
   SECTION("uniform flow") { check_flow("uniform_flow", {"grid.nodes=[17,17,25]"}); }
@@ -262,8 +259,8 @@ TEST_CASE("flows launch and allocate what they ask for, nothing else, and nothin
   }
   SECTION("straight tube with two cells") { check_flow("straight_tube", {tube}, 10); }
   SECTION("straight tube, least of everything") {
-    check_flow("straight_tube", {tube, "fluid.convection=false", "cells.0.membrane_viscosity_N_s_per_m=0",
-                                 "output.fields=false", "output.cells=false"});
+    check_flow("straight_tube",
+               {tube, "fluid.convection=false", "cells.0.membrane_viscosity_N_s_per_m=0", "output.fields=false", "output.cells=false"});
   }
   SECTION("straight tube, iterated coupling") {
     check_flow("straight_tube", {tube, "coupling.scheme=iterated", "coupling.tolerance=0.01"});
@@ -329,8 +326,9 @@ TEST_CASE("what membranes as forces can do costs nothing where a scene does not 
     }
   }
   SECTION("keys at the values that they have without being given") {
-    const Counts given = counts_of(bare_capsule({"coupling.slip=false", "cells.0.viscosity_ratio=1", "cells.0.membrane_viscosity_N_s_per_m=0",
-                                                 "cells.0.push_nN=[0,0,0]", "cells.0.start_stretch=[1,1,1]"}));
+    const Counts given =
+        counts_of(bare_capsule({"coupling.slip=false", "cells.0.viscosity_ratio=1", "cells.0.membrane_viscosity_N_s_per_m=0",
+                                "cells.0.push_nN=[0,0,0]", "cells.0.start_stretch=[1,1,1]"}));
     CHECK(given.kernels == least.kernels);
     CHECK(given.allocations == least.allocations);
   }
@@ -378,7 +376,8 @@ TEST_CASE("a run says of every cell, packed ones as well, what it has active and
     CHECK(is_active(blood, module));
   }
   const Case flow = read_case(case_file("couette"), {});
-  for (const char* module : {"transfer of forces", "slip correction", "viscosity ratio", "contact", "membrane", "coupling", "blood statistics"}) {
+  for (const char* module :
+       {"transfer of forces", "slip correction", "viscosity ratio", "contact", "membrane", "coupling", "blood statistics"}) {
     INFO(module);
     CHECK_FALSE(is_active(flow, module));
   }
@@ -456,8 +455,8 @@ TEST_CASE("stretching has no grid, no search and no coupling", "[needless]") {
   const Counts counts{Recorder::kernels(), Recorder::allocations()};
   check_labels(counts);
   check_modules(scene, counts);
-  for (const char* prefix : {"corpuscle::fluid::", "corpuscle::multigrid::", "corpuscle::grid::", "corpuscle::halo::",
-                             "corpuscle::coupling::"}) {
+  for (const char* prefix :
+       {"corpuscle::fluid::", "corpuscle::multigrid::", "corpuscle::grid::", "corpuscle::halo::", "corpuscle::coupling::"}) {
     INFO(prefix);
     CHECK(counts.of(prefix) == 0);
   }

@@ -14,8 +14,7 @@ namespace test {
 /// Empty, made by rank 0, named for the number of ranks so that runs on several do not meet.
 inline std::filesystem::path fresh_folder(const std::string& name) {
   const corpuscle::Comm comm;
-  const auto folder =
-      std::filesystem::temp_directory_path() / ("corpuscle_output_" + std::to_string(comm.size()) + "_" + name);
+  const auto folder = std::filesystem::temp_directory_path() / ("corpuscle_output_" + std::to_string(comm.size()) + "_" + name);
   comm.barrier();
   if (comm.root()) {
     std::filesystem::remove_all(folder);

@@ -35,8 +35,7 @@ std::vector<double> values(const IndexSpace& index, int components, int more) {
   for (int k = 0; k < index.n[2] + more; ++k)
     for (int j = 0; j < index.n[1] + more; ++j)
       for (int i = 0; i < index.n[0] + more; ++i)
-        for (int c = 0; c < components; ++c)
-          out.push_back(place(index.first[0] + i, index.first[1] + j, index.first[2] + k, c));
+        for (int c = 0; c < components; ++c) out.push_back(place(index.first[0] + i, index.first[1] + j, index.first[2] + k, c));
   return out;
 }
 
@@ -50,8 +49,7 @@ std::vector<double> whole(int components, int more) {
 void store(FieldWriter& writer, const IndexSpace& index, double time, long step) {
   const auto velocity = values(index, 3, 0), pressure = values(index, 1, 0);
   const std::vector<std::int8_t> kind(index.owned(), static_cast<std::int8_t>(step));
-  writer.write(time, step, {{"velocity_um_per_us", 3, velocity.data()}, {"pressure_kPa", 1, pressure.data()}},
-               {{"kind", kind.data()}});
+  writer.write(time, step, {{"velocity_um_per_us", 3, velocity.data()}, {"pressure_kPa", 1, pressure.data()}}, {{"kind", kind.data()}});
 }
 
 CheckpointHeader header() {
@@ -178,8 +176,7 @@ TEST_CASE("cells.h5 holds surfaces and their values", "[ranks]") {
   std::vector<std::int32_t> stored(6);
   file.read("triangles", stored.data());
   REQUIRE(stored == triangles);
-  REQUIRE_THAT(test::contents(folder / "cells.xdmf"),
-               Contains("Time Value=\"7.25\"") && Contains("cells/step_000000003.h5:/traction_kPa"));
+  REQUIRE_THAT(test::contents(folder / "cells.xdmf"), Contains("Time Value=\"7.25\"") && Contains("cells/step_000000003.h5:/traction_kPa"));
 }
 
 TEST_CASE("a checkpoint reads back bit for bit, on any split of the grid", "[ranks]") {
@@ -347,7 +344,8 @@ TEST_CASE("a checkpoint with any other number or text of its header, or any othe
   // Any bit of what the file holds in full: of the case, the lists of names and the time's own bytes.
   const auto bytes = test::contents(good);
   const double stored = header().time_us;
-  for (const auto& what : {std::string("########"), std::string("membrane/x\nsearch"), std::string(reinterpret_cast<const char*>(&stored), 8)}) {
+  for (const auto& what :
+       {std::string("########"), std::string("membrane/x\nsearch"), std::string(reinterpret_cast<const char*>(&stored), 8)}) {
     const auto at = bytes.find(what);
     REQUIRE(at != std::string::npos);
     for (std::size_t bit = 0; bit < 8 * what.size(); bit += 5) {
@@ -399,7 +397,8 @@ TEST_CASE("a stored time costs the same however many there are, and each is list
   for (auto at = xdmf.find("<Time"); at != std::string::npos; at = xdmf.find("<Time", at + 1)) ++times;
   CHECK(times == 1604);
   CHECK_THAT(xdmf, Catch::EndsWith("</Xdmf>\n"));
-  for (const auto& entry : fs::directory_iterator(folder)) CHECK((entry.path().extension() == ".h5" || entry.path().extension() == ".xdmf" || entry.is_directory()));
+  for (const auto& entry : fs::directory_iterator(folder))
+    CHECK((entry.path().extension() == ".h5" || entry.path().extension() == ".xdmf" || entry.is_directory()));
 }
 
 TEST_CASE("a checkpoint that was not finished leaves the last good one", "[ranks]") {
@@ -447,8 +446,7 @@ TEST_CASE("a full disk: what does not fit is refused with sizes, and the last go
     writer.add("large", {huge}, &value);
     writer.commit();
   });
-  REQUIRE_THAT(message,
-               Contains("checkpoint.h5.part: the disk is full: large needs 5.765e+11 MB") && Contains("are free"));
+  REQUIRE_THAT(message, Contains("checkpoint.h5.part: the disk is full: large needs 5.765e+11 MB") && Contains("are free"));
   comm.barrier();
   REQUIRE(test::contents(path) == before);
   REQUIRE_FALSE(fs::exists(path + ".part"));

@@ -54,8 +54,7 @@ TEST_CASE("history.csv has the columns of the scene and every digit", "[ranks]")
           "time_us,cell,centroid_x_um,centroid_y_um,centroid_z_um,velocity_x_mm_per_s,velocity_y_mm_per_s,"
           "velocity_z_mm_per_s,extent_x_um,extent_y_um,extent_z_um,area_um2,volume_um3,elastic_energy_fJ,"
           "flow_rate_um3_per_us");
-  REQUIRE(text[1] ==
-          "0.10000000000000001,0,0.10000000000000001,-0.33333333333333331,0.14285714285714285,0,0,2,,,,134,,,0.25");
+  REQUIRE(text[1] == "0.10000000000000001,0,0.10000000000000001,-0.33333333333333331,0.14285714285714285,0,0,2,,,,134,,,0.25");
   REQUIRE(text[2] == "0.20000000000000001,,,,,,,,,,,,,,");
 }
 
@@ -110,8 +109,7 @@ TEST_CASE("a history with other columns is not continued") {
   const auto folder = test::fresh_folder("history_other");
   const Comm comm;
   { HistoryWriter history(folder.string(), comm, {.cells = true}); }
-  const auto message =
-      test::message_of<InputError>([&] { HistoryWriter(folder.string(), comm, {.bodies = true}, 1.0); });
+  const auto message = test::message_of<InputError>([&] { HistoryWriter(folder.string(), comm, {.bodies = true}, 1.0); });
   REQUIRE_THAT(message, Contains("history.csv") && Contains("columns") && Contains("--out"));
 }
 
@@ -154,8 +152,8 @@ TEST_CASE("report.json holds the contract's entries", "[ranks]") {
   report.extra["stability_margin"] = 2.0;
   write_report(folder.string(), comm, report);
   const auto json = nlohmann::json::parse(test::contents(folder / "report.json"));
-  for (const char* key : {"case", "git", "backend", "ranks", "threads", "modules", "steps", "simulated_us", "wall_s",
-                          "wall_s_by_part", "peak_rss_mb", "iterations", "errors"})
+  for (const char* key : {"case", "git", "backend", "ranks", "threads", "modules", "steps", "simulated_us", "wall_s", "wall_s_by_part",
+                          "peak_rss_mb", "iterations", "errors"})
     REQUIRE(json.contains(key));
   REQUIRE(json["ranks"] == comm.size());
   REQUIRE(json["modules"]["left_out"][0] == "membrane");

@@ -51,7 +51,8 @@ Components<double> to_device(const std::vector<Triple>& points) {
   return x;
 }
 
-/// Anywhere between the nodes, each as a place within one of the cells: of those at walls not nearer to them than 0.3 of one, as curved walls are seen as chords.
+/// Anywhere between the nodes, each as a place within one of the cells: of those at walls not nearer to them than 0.3 of one, as curved
+/// walls are seen as chords.
 std::vector<Triple> anywhere(const NodeSource& source, int count) {
   std::mt19937 random(7);
   const auto number = [&](int below) { return static_cast<int>(random() % static_cast<unsigned>(below)); };
@@ -129,7 +130,7 @@ TEST_CASE("a wall is near only where its cells are: not behind the plane in whic
   };
   CHECK(least(middle, 1) == 1e30);
   CHECK(least(middle, 2) == Approx(12 * 4 * pi / 3 / stations).epsilon(0.02));  // to the ends, along the arc
-  CHECK(least(beside, 1) == Approx(0.5).margin(0.08));  // walls are chords, of up to 1 um: 0.05 um off the circle
+  CHECK(least(beside, 1) == Approx(0.5).margin(0.08));                          // walls are chords, of up to 1 um: 0.05 um off the circle
 }
 
 TEST_CASE("of two walls in a corner the nearer one counts, whichever it is", "[contact]") {

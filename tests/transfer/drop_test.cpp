@@ -31,10 +31,8 @@ NodeSource cube_of(int cells, double length) {
 
 /// A drop of radius one, `ratio` times as viscous as the fluid around it, whose viscosity is one.
 struct Drop : HeldSurface {
-  Drop(int cells, double length, const std::vector<BoundarySettings>& boundaries, const FluidSettings& settings,
-       double ratio)
-      : HeldSurface(cube_of(cells, length), boundaries, settings,
-                    ellipsoid_mesh({1, 1, 1}, {0.03, -0.02, 0.01}, 0.7 * length / cells),
+  Drop(int cells, double length, const std::vector<BoundarySettings>& boundaries, const FluidSettings& settings, double ratio)
+      : HeldSurface(cube_of(cells, length), boundaries, settings, ellipsoid_mesh({1, 1, 1}, {0.03, -0.02, 0.01}, 0.7 * length / cells),
                     CouplingSettings::Kernel::three_point),
         cytosol(grid, {ratio}),
         kinds{Array<int>("corpuscle::test::type", 1), Table<int>("corpuscle::test::turns", 1, 3)} {
@@ -82,8 +80,7 @@ namespace {
 
 /// Walls at distance `length` that move along x, so that the fluid between is sheared at a rate of one.
 std::vector<BoundarySettings> shearing_walls(double length) {
-  auto walls =
-      sides({Type::periodic, Type::periodic, Type::moving_wall, Type::moving_wall, Type::periodic, Type::periodic});
+  auto walls = sides({Type::periodic, Type::periodic, Type::moving_wall, Type::moving_wall, Type::periodic, Type::periodic});
   walls[2].velocity = Triple{-length / 2, 0, 0}, walls[3].velocity = Triple{length / 2, 0, 0};
   return walls;
 }
@@ -139,8 +136,7 @@ TEST_CASE("drops rise as Hadamard and Rybczynski say", "[transfer][drop]") {
   // is a normal load G z. In a periodic box F / (6 pi mu) (-2.8373 / L + 4 pi / 3 a^2 / L^3 3 r / (3 r + 2)) is added
   // to the speed: Hasimoto, J. Fluid Mech. 5, 1959, with the drop's own second term.
   const double ratio = GENERATE(1.0, 5.0), length = 6, total = 6 * pi, buoyancy = total / (4 * pi / 3);
-  const auto all =
-      sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
+  const auto all = sides({Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic, Type::periodic});
   auto settings = stokes();
   settings.pressure_gradient_Pa_per_um = {0, 0, 1e3 * total / std::pow(length, 3)};
   Drop drop(36, length, all, settings, ratio);

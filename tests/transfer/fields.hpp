@@ -14,7 +14,7 @@ using namespace corpuscle::fluid_test;
 
 using Kernel = CouplingSettings::Kernel;
 inline const std::array<Type, 6> walls{Type::moving_wall, Type::moving_wall, Type::moving_wall,
-                                Type::moving_wall, Type::moving_wall, Type::moving_wall};
+                                       Type::moving_wall, Type::moving_wall, Type::moving_wall};
 
 class Noise {
  public:
@@ -144,7 +144,7 @@ inline double largest_difference(const Transfer& of_ranks, const Transfer& of_on
 }
 
 inline double largest_error(const Components<double>& v, const Components<double>& x,
-                     const std::function<Triple(const Triple&)>& velocity) {
+                            const std::function<Triple(const Triple&)>& velocity) {
   const auto at = on_host(x);
   const auto found = sum_of_ranks(v);
   double worst = 0;

@@ -4,9 +4,9 @@
 #include <catch2/catch.hpp>
 
 #include "../fluid/fluid_fixture.hpp"
+#include "cells/rank_blocks.hpp"
 #include "held_surface.hpp"
 #include "immersed/surface_work.hpp"
-#include "cells/rank_blocks.hpp"
 #include "transfer/cytosol.hpp"
 
 using namespace corpuscle;
@@ -27,8 +27,8 @@ NodeSource cube_of(int cells, double length) {
 
 /// The part of each cell inside, and the volume that the surfaces enclose as the grid sees it and as they do.
 struct Inside {
-  Inside(Comm comm, const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries,
-         const std::vector<TriangleMesh>& meshes, std::vector<double> ratios = {})
+  Inside(Comm comm, const NodeSource& nodes, const std::vector<BoundarySettings>& boundaries, const std::vector<TriangleMesh>& meshes,
+         std::vector<double> ratios = {})
       : grid(comm, nodes, periodic(boundaries)),
         surfaces(make_surface_set(with_copies(meshes))),
         transfer(grid, boundaries, three_point, surfaces.vertices),
@@ -98,9 +98,8 @@ double misplaced(Inside& s, const Triple& axes, const Triple& center, double mar
   const auto x = on_host(s.grid.views().x);
   double wrong = 0;
   s.visit([&](int c, int, int, int) {
-    const double r =
-        std::sqrt(std::pow((x(c, 0) - center[0]) / axes[0], 2) + std::pow((x(c, 1) - center[1]) / axes[1], 2) +
-                  std::pow((x(c, 2) - center[2]) / axes[2], 2));
+    const double r = std::sqrt(std::pow((x(c, 0) - center[0]) / axes[0], 2) + std::pow((x(c, 1) - center[1]) / axes[1], 2) +
+                               std::pow((x(c, 2) - center[2]) / axes[2], 2));
     const double least = *std::min_element(axes.begin(), axes.end());
     if ((r - 1) * least < -margin && s.fraction(c) != 2) ++wrong;
     if ((r - 1) * least > margin && s.fraction(c) != 1) ++wrong;
@@ -128,15 +127,13 @@ TEST_CASE("the inside of a sphere and an ellipsoid has their volume, on any grid
   const Triple axes = GENERATE(Triple{1, 1, 1}, Triple{1.3, 1, 0.77});
   const double size = which == 2 ? 0.4 : 1;  // the warped box is two wide
   const Triple scaled{size * axes[0], size * axes[1], size * axes[2]};
-  const Triple center =
-      which == 0 ? Triple{0.03, -0.02, 0.01} : (which == 1 ? Triple{0.3, 0.2, -0.1} : Triple{1.3, 1.14, 1.18});
+  const Triple center = which == 0 ? Triple{0.03, -0.02, 0.01} : (which == 1 ? Triple{0.3, 0.2, -0.1} : Triple{1.3, 1.14, 1.18});
   const double h = which == 2 ? 0.08 : 0.2;
-  Inside s(Comm(), which == 0 ? cube_of(25, 5) : (which == 1 ? make_node_source(tube) : skewed),
-           which == 1 ? tube_sides : all(Type::wall), {ellipsoid_mesh(scaled, center, 0.5 * h)});
+  Inside s(Comm(), which == 0 ? cube_of(25, 5) : (which == 1 ? make_node_source(tube) : skewed), which == 1 ? tube_sides : all(Type::wall),
+           {ellipsoid_mesh(scaled, center, 0.5 * h)});
   s.update();
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("grid {}: inside {:.6f} of {:.6f}: {:.2e}", which, s.inside, s.enclosed,
-                     s.inside / s.enclosed - 1));
+    WARN(fmt::format("grid {}: inside {:.6f} of {:.6f}: {:.2e}", which, s.inside, s.enclosed, s.inside / s.enclosed - 1));
   // Lines are a spacing apart, and a sphere of five spacings ends between two of them.
   CHECK(s.inside == Approx(s.enclosed).epsilon(0.015));
   CHECK(misplaced(s, scaled, center, 1.2 * h) == 0);
@@ -182,8 +179,7 @@ TEST_CASE("the volume inside comes nearer to that enclosed on finer grids", "[tr
     }
     error.push_back(largest);
   }
-  if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("errors of the volume {:.2e}, {:.2e}, {:.2e}", error[0], error[1], error[2]));
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("errors of the volume {:.2e}, {:.2e}, {:.2e}", error[0], error[1], error[2]));
   CHECK(error[2] < 0.35 * error[0]);  // chords end as roots of the distance: order 3/2
   CHECK(error[2] < 3e-3);
 }
@@ -215,8 +211,7 @@ TEST_CASE("what is inside goes round periodic sides with its surface", "[transfe
   Inside middle(Comm(), cube_of(n, length), all(Type::periodic), {mesh});
   middle.update();
   REQUIRE(middle.inside == Approx(middle.enclosed).epsilon(4e-3));  // five spacings a radius
-  const std::array<int, 3> shift =
-      GENERATE(std::array<int, 3>{10, 0, 0}, std::array<int, 3>{0, 8, 0}, std::array<int, 3>{-10, 9, 10});
+  const std::array<int, 3> shift = GENERATE(std::array<int, 3>{10, 0, 0}, std::array<int, 3>{0, 8, 0}, std::array<int, 3>{-10, 9, 10});
   TriangleMesh moved = mesh;
   for (auto& p : moved.vertices)
     for (int d = 0; d < 3; ++d) p[d] += shift[d] * h;
@@ -232,10 +227,8 @@ TEST_CASE("what is inside goes round periodic sides with its surface", "[transfe
   CHECK(most < 1e-5);  // places are rounded to 1e-6 spacings
 }
 
-TEST_CASE("each cell has the viscosity of its own kind, and a surface that is not closed is noticed",
-          "[transfer][inside]") {
-  const auto one = ellipsoid_mesh({0.8, 0.8, 0.8}, {-1, 0, 0}, 0.1),
-             two = ellipsoid_mesh({0.8, 0.8, 0.8}, {1, 0, 0}, 0.1),
+TEST_CASE("each cell has the viscosity of its own kind, and a surface that is not closed is noticed", "[transfer][inside]") {
+  const auto one = ellipsoid_mesh({0.8, 0.8, 0.8}, {-1, 0, 0}, 0.1), two = ellipsoid_mesh({0.8, 0.8, 0.8}, {1, 0, 0}, 0.1),
              three = ellipsoid_mesh({0.5, 0.5, 0.5}, {0, 1.7, 0}, 0.1);
   Inside s(Comm(), cube_of(25, 5), all(Type::wall), {one, two, three}, {5, 0.2, 1});
   s.update();
@@ -254,8 +247,7 @@ TEST_CASE("each cell has the viscosity of its own kind, and a surface that is no
 }
 
 #ifdef CORPUSCLE_MPI
-TEST_CASE("a surface that is not closed is noticed on all ranks, where lines go through several of them",
-          "[transfer][inside][ranks]") {
+TEST_CASE("a surface that is not closed is noticed on all ranks, where lines go through several of them", "[transfer][inside][ranks]") {
   const auto mesh = ellipsoid_mesh({1.5, 1.4, 1.3}, {0.1, -0.1, 0.05}, 0.3);
   Inside s(Comm(), cube_of(16, 4), all(Type::wall), {mesh});
   s.update();
@@ -283,15 +275,13 @@ TEST_CASE("what is inside is the same to the bit on any ranks", "[transfer][insi
   const double length = 4;
   const Triple center = type == Type::periodic ? Triple{1.7, 0.3, -1.8} : Triple{0.4, 0.1, -0.2};
   const auto mesh = ellipsoid_mesh({1.3, 1, 0.77}, center, 0.1);
-  Inside alone(Comm(MPI_COMM_SELF), cube_of(20, length), all(type), {mesh}),
-      shared(Comm(), cube_of(20, length), all(type), {mesh});
+  Inside alone(Comm(MPI_COMM_SELF), cube_of(20, length), all(type), {mesh}), shared(Comm(), cube_of(20, length), all(type), {mesh});
   alone.update(), shared.update();
   CHECK_FALSE(shared.cytosol.broken());
   const IndexSpace &whole = alone.grid.index(), &index = shared.grid.index();
   int different = 0;
   shared.visit([&](int c, int i, int j, int k) {
-    different +=
-        shared.fraction(c) != alone.fraction(whole.cell(i + index.first[0], j + index.first[1], k + index.first[2]));
+    different += shared.fraction(c) != alone.fraction(whole.cell(i + index.first[0], j + index.first[1], k + index.first[2]));
   });
   CHECK(different == 0);
 }

@@ -78,6 +78,7 @@ TEST_CASE("loads that jump add up to nearly their sum", "[transfer][sharp]") {
   for (int k = 1; k < index.n[2]; ++k)
     for (int j = 0; j < index.n[1]; ++j)
       for (int i = 0; i < index.n[0]; ++i) on_faces += 0.04 * across(index.cell(i, j, k));
-  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("{:.6f} of {:.6f}, off by {:.2e} of the magnitudes", on_faces, sum, (on_faces - sum) / size));
+  if (std::getenv("CORPUSCLE_SHOW"))
+    WARN(fmt::format("{:.6f} of {:.6f}, off by {:.2e} of the magnitudes", on_faces, sum, (on_faces - sum) / size));
   CHECK(std::abs(on_faces - sum) < 0.01 * size);
 }

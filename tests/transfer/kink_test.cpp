@@ -73,9 +73,10 @@ TEST_CASE("forces go the way back that velocities lose their kink", "[transfer][
     std::array<Type, 6> types;
     bool periodic;
   };
-  const auto s = GENERATE(Setting{walls, false},
-                          Setting{{Type::symmetry, Type::moving_wall, Type::velocity_inlet, Type::outflow, Type::symmetry, Type::symmetry}, false},
-                          Setting{{Type::periodic, Type::periodic, Type::moving_wall, Type::symmetry, Type::periodic, Type::periodic}, true});
+  const auto s =
+      GENERATE(Setting{walls, false},
+               Setting{{Type::symmetry, Type::moving_wall, Type::velocity_inlet, Type::outflow, Type::symmetry, Type::symmetry}, false},
+               Setting{{Type::periodic, Type::periodic, Type::moving_wall, Type::symmetry, Type::periodic, Type::periodic}, true});
   const auto kernel = GENERATE(Kernel::three_point, Kernel::four_point);
   const Comm comm;
   Grid grid(comm, s.periodic ? sheared_box({12, 11, 13}) : warped_box({12, 11, 13}), {s.periodic, false, s.periodic});
@@ -131,8 +132,18 @@ TEST_CASE("of a velocity only what shears along a membrane between two fluids is
   };
   const auto nothing = [](const Vec3&, const Vec3&, double) { return Vec3{}; };
   const double round_off = comm.size() > 1 && kernel == Kernel::four_point ? 3e-5 : 1e-11;  // of areas beyond halos
-  CHECK(change(true, [](const Triple&) { return Triple{0.3, -1, 0.7}; }, nothing) < round_off);
-  CHECK(change(false, [](const Triple& p) { return Triple{p[1] - 2 * p[2], 3 * p[2] - p[0], 2 * p[0] - 3 * p[1]}; }, nothing) < round_off);
+  CHECK(change(
+            true,
+            [](const Triple&) {
+              return Triple{0.3, -1, 0.7};
+            },
+            nothing) < round_off);
+  CHECK(change(
+            false,
+            [](const Triple& p) {
+              return Triple{p[1] - 2 * p[2], 3 * p[2] - p[0], 2 * p[0] - 3 * p[1]};
+            },
+            nothing) < round_off);
   // u = (y, 0, 0): grad u + grad u^T = e_x e_y + e_y e_x; spacings g of the sheared box, of 2 um.
   const double share = (kernel == Kernel::three_point ? 0.237 : 0.358) * 2 * (ratio - 1) / (ratio + 1);
   const auto shear = [&](const Vec3& n, const Vec3& x, double gap) {
@@ -148,7 +159,12 @@ TEST_CASE("of a velocity only what shears along a membrane between two fluids is
     const Vec3 twice = {n.y, n.x, 0};
     return (-share * left * slip_share(gap / spacing) * spacing) * (twice - dot(twice, n) * n);
   };
-  CHECK(change(false, [](const Triple& p) { return Triple{p[1], 0, 0}; }, shear) < 1e-10);
+  CHECK(change(
+            false,
+            [](const Triple& p) {
+              return Triple{p[1], 0, 0};
+            },
+            shear) < 1e-10);
 }
 
 TEST_CASE("what is taken off of forces leaves their sum as it is", "[transfer][ranks]") {
@@ -167,7 +183,8 @@ TEST_CASE("what is taken off of forces leaves their sum as it is", "[transfer][r
     transfer.spread(p.force, &slip);
     const double with = face_sum(transfer, [&](int d, int c) { return area[d](c, m); });
     transfer.spread(p.force);
-    CHECK(with == Approx(face_sum(transfer, [&](int d, int c) { return area[d](c, m); })).margin(kernel == Kernel::three_point ? 0.05 : 0.02));
+    CHECK(with ==
+          Approx(face_sum(transfer, [&](int d, int c) { return area[d](c, m); })).margin(kernel == Kernel::three_point ? 0.05 : 0.02));
   }
 }
 
@@ -177,7 +194,8 @@ TEST_CASE("how the grid is cut over ranks does not change what kinks are", "[tra
   const NodeSource nodes = warped_box({9, 8, 10});
   Grid cut(comm, nodes, {false, false, false}), whole(Comm::alone(), nodes, {false, false, false});
   const Points p = random_points(600, 0.02, true);
-  Transfer of_ranks(cut, sides(walls), Kernel::three_point, p.set.vertices), of_one(whole, sides(walls), Kernel::three_point, p.set.vertices);
+  Transfer of_ranks(cut, sides(walls), Kernel::three_point, p.set.vertices),
+      of_one(whole, sides(walls), Kernel::three_point, p.set.vertices);
   for (Transfer* transfer : {&of_ranks, &of_one}) {
     transfer->slip_between({ratio});
     REQUIRE(transfer->place(p.set.x) == -1);
@@ -198,7 +216,8 @@ namespace {
 constexpr double high = 16;
 
 /// A plane across y above a wall, the fluid below it `r` times as viscous, where the upper wall moves with `wall` (or there is none to it,
-/// but symmetry) and the plane is pushed along x with `pull` per area, times viscosity over spacing: how much faster the plane is than it should be.
+/// but symmetry) and the plane is pushed along x with `pull` per area, times viscosity over spacing: how much faster the plane is than it
+/// should be.
 double plane_error(double y, double r, double wall, double pull, bool with, Type top = Type::moving_wall) {
   constexpr int n = 4, along = 2 * n, count = along * along;
   auto boundaries = sides({Type::periodic, Type::periodic, Type::wall, top, Type::periodic, Type::periodic});
@@ -210,7 +229,8 @@ double plane_error(double y, double r, double wall, double pull, bool with, Type
   settings.kinematic_viscosity_um2_per_us = 1;
   settings.momentum_tolerance = settings.divergence_tolerance = 1e-10;
   FluidSolver fluid(grid, settings, boundaries);
-  const Array<double> relative("corpuscle::test::relative", grid.index().size()), fluidity("corpuscle::test::fluidity", grid.index().size());
+  const Array<double> relative("corpuscle::test::relative", grid.index().size()),
+      fluidity("corpuscle::test::fluidity", grid.index().size());
   const auto at = on_host(grid.views().x);
   const auto mu = Kokkos::create_mirror_view(relative), inverse = Kokkos::create_mirror_view(fluidity);
   for (int c = 0; c < grid.index().size(); ++c) {
@@ -272,16 +292,22 @@ TEST_CASE("a plane between two fluids moves as it should, sheared or pulled", "[
 TEST_CASE("beside a wall a plane between two fluids moves as well as it does amid the channel", "[transfer]") {
   // Where in a cell the plane lies makes 0.1 h of shear's jump: so by that of a plane as far up in another cell.
   const double r = GENERATE(0.2, 5.0), mean = 0.5 * (1 + r);
-  const auto sheared = [&](double gap, bool with) { return plane_error(high - gap, r, 1, 0, with) * (gap + (high - gap) / r) / (1 - 1 / r); };
+  const auto sheared = [&](double gap, bool with) {
+    return plane_error(high - gap, r, 1, 0, with) * (gap + (high - gap) / r) / (1 - 1 / r);
+  };
   const auto pulled = [&](double gap, bool with, Type top) { return plane_error(high - gap, r, 0, 1, with, top) * mean; };
   for (const double gap : {0.2, 0.5, 0.85, 1.2, 1.7}) {
     const double without = sheared(gap, false), with = sheared(gap, true), far = sheared(gap + 4, true);
-    const double pulled_without = pulled(gap, false, walls[3]), pulled_with = pulled(gap, true, walls[3]), pulled_far = pulled(gap + 4, true, walls[3]);
-    const double free_without = pulled(gap, false, Type::symmetry), free_with = pulled(gap, true, Type::symmetry), free_far = pulled(gap + 4, true, Type::symmetry);
+    const double pulled_without = pulled(gap, false, walls[3]), pulled_with = pulled(gap, true, walls[3]),
+                 pulled_far = pulled(gap + 4, true, walls[3]);
+    const double free_without = pulled(gap, false, Type::symmetry), free_with = pulled(gap, true, Type::symmetry),
+                 free_far = pulled(gap + 4, true, Type::symmetry);
     INFO("r " << r << ", gap " << gap << " h");
     if (std::getenv("CORPUSCLE_SHOW"))
-      WARN(fmt::format("r {}, gap {} h: sheared {:.3f} ({:.3f} without, {:.3f} far away); pulled {:.3f} ({:.3f}, {:.3f}); beside symmetry {:.3f} ({:.3f}, {:.3f})",
-                       r, gap, with, without, far, pulled_with, pulled_without, pulled_far, free_with, free_without, free_far));
+      WARN(
+          fmt::format("r {}, gap {} h: sheared {:.3f} ({:.3f} without, {:.3f} far away); pulled {:.3f} ({:.3f}, {:.3f}); beside symmetry "
+                      "{:.3f} ({:.3f}, {:.3f})",
+                      r, gap, with, without, far, pulled_with, pulled_without, pulled_far, free_with, free_without, free_far));
     CHECK(std::abs(with) < 0.04);  // 0.034 at most, of which as much far away
     if (gap > 0.6) CHECK(without > 0.08);
     CHECK(std::abs(pulled_with) < (gap < 0.5 ? 0.28 : 0.21));  // 0.48 without

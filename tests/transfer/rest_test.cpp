@@ -36,8 +36,7 @@ Rest at_rest(HeldSurface& held, const Triple& semi_axes, double h, int steps) {
   double inside = 0, outside = 0, within = 0, without = 0;
   held.visit_cells([&](const Vec3& x, double p, const Vec3& u) {
     rest.in_cells = std::max(rest.in_cells, norm(u));
-    const double r =
-        std::sqrt(std::pow(x.x / semi_axes[0], 2) + std::pow(x.y / semi_axes[1], 2) + std::pow(x.z / semi_axes[2], 2));
+    const double r = std::sqrt(std::pow(x.x / semi_axes[0], 2) + std::pow(x.y / semi_axes[1], 2) + std::pow(x.z / semi_axes[2], 2));
     const double distance = (r - 1) * semi_axes[2];  // at least
     if (distance < -2 * h) inside += p, ++within;
     if (distance > 2 * h) outside += p, ++without;
@@ -59,8 +58,7 @@ TEST_CASE("membranes under a uniform normal load leave the fluid at rest", "[tra
   const auto closed = sides({Type::wall, Type::wall, Type::wall, Type::wall, Type::wall, Type::wall});
   const Triple axes = GENERATE(Triple{1, 1, 1}, Triple{1.3, 1, 0.77});
   // The mesh is finer than a cell needs: with edges of 0.7 h its own area is 0.5 % too small.
-  HeldSurface held(make_node_source(nodes), closed, stokes(), ellipsoid_mesh(axes, {0.03, -0.02, 0.01}, 0.4 * h),
-                   Kernel::three_point);
+  HeldSurface held(make_node_source(nodes), closed, stokes(), ellipsoid_mesh(axes, {0.03, -0.02, 0.01}, 0.4 * h), Kernel::three_point);
   const Rest rest = at_rest(held, axes, h, 4);
   if (std::getenv("CORPUSCLE_SHOW"))
     WARN(fmt::format("{} vertices: {:.3g} at vertices, {:.3g} in cells, jump {:.5f}", held.surface.vertices, rest.at_vertices,
@@ -70,8 +68,7 @@ TEST_CASE("membranes under a uniform normal load leave the fluid at rest", "[tra
   CHECK(rest.jump == Approx(1).epsilon(3e-3));
 }
 
-TEST_CASE("a pressure that jumps leaves the fluid at rest on any grid, with one value inside and one outside",
-          "[transfer][sharp][ranks]") {
+TEST_CASE("a pressure that jumps leaves the fluid at rest on any grid, with one value inside and one outside", "[transfer][sharp][ranks]") {
   // Walls all round, and a tube whose circles leave the lines of its grid aslant; a is 1 um, or 0.4 um on a grid that is warped.
   struct Setting {
     NodeSource nodes;
@@ -152,8 +149,7 @@ TEST_CASE("the slip correction gives spheres their size, whatever the spacings a
   auto settings = stokes();
   const Vec3 gradient = (1e3 * total / std::pow(length, 3)) * s.along;
   settings.pressure_gradient_Pa_per_um = {gradient.x, gradient.y, gradient.z};
-  HeldSurface held(make_node_source(nodes), all, settings, ellipsoid_mesh({a, a, a}, {0.07, 0.13, -0.05}, 0.7 * fine),
-                   s.kernel);
+  HeldSurface held(make_node_source(nodes), all, settings, ellipsoid_mesh({a, a, a}, {0.07, 0.13, -0.05}, 0.7 * fine), s.kernel);
   const auto area = on_host(held.surface.area);
   double whole = 0;
   for (int i = 0; i < held.surface.vertices; ++i) whole += area(i);
@@ -168,8 +164,7 @@ TEST_CASE("the slip correction gives spheres their size, whatever the spacings a
   const double without = too_large();
   held.take_velocity(true);
   const double with = too_large();
-  if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(fmt::format("radius too large by {:.3f} h without slip, {:.3f} h with", without, with));
+  if (std::getenv("CORPUSCLE_SHOW")) WARN(fmt::format("radius too large by {:.3f} h without slip, {:.3f} h with", without, with));
   CHECK(without > s.least);
   CHECK(without < s.most);
   CHECK(std::abs(with) < 0.05);

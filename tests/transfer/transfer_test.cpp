@@ -71,8 +71,7 @@ TEST_CASE("uniform velocities are exact on any grid and linear ones on straight 
     transfer.interpolate(field.flux, field.u, nullptr, v);
     return largest_error(v, x, velocity);
   };
-  Grid warped(comm, warped_box({9, 8, 10}), {false, false, false}),
-      straight(comm, sheared_box({9, 8, 10}), {false, false, false});
+  Grid warped(comm, warped_box({9, 8, 10}), {false, false, false}), straight(comm, sheared_box({9, 8, 10}), {false, false, false});
   const auto uniform = [](const Triple&) { return Triple{0.3, -1, 0.7}; };
   const auto linear = [](const Triple& p) { return Triple{0.3 + p[1] - 2 * p[2], p[0] - p[1], 0.2 + p[1] + p[2] - 3 * p[0]}; };
   // The four-point kernel reaches one row further than halos do: there the faces' areas are extrapolated,

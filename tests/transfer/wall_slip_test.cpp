@@ -94,8 +94,7 @@ TEST_CASE("the slip correction is right beside a wall, down to no gap", "[transf
   for (double gap : {0.05, 0.1, 0.25, 0.5, 0.75, 1.0, 1.4, 2.0}) {
     const PlateSpeeds speed = plate_speeds(gap);
     if (std::getenv("CORPUSCLE_SHOW"))
-      WARN(fmt::format("gap {} h: {:+.3f} h without slip, {:+.3f} h with", gap, speed.without - speed.exact,
-                       speed.with - speed.exact));
+      WARN(fmt::format("gap {} h: {:+.3f} h without slip, {:+.3f} h with", gap, speed.without - speed.exact, speed.with - speed.exact));
     INFO("gap " << gap << " h");
     CHECK(std::abs(speed.with - speed.exact) < 0.055);  // of up to 0.15
     if (gap >= 0.5) CHECK(speed.without - speed.exact < -0.07);

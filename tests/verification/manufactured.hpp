@@ -26,8 +26,7 @@ struct Flow {
     return from_rest ? (t > 0 ? 3 * rate * s * s * c : 0.0) : 0.5 * rate * c;
   }
   KOKKOS_INLINE_FUNCTION Vec3 shape(const Vec3& x) const {
-    return {a * std::sin(x.z) + c * std::cos(x.y), b * std::sin(x.x) + a * std::cos(x.z),
-            c * std::sin(x.y) + b * std::cos(x.x)};
+    return {a * std::sin(x.z) + c * std::cos(x.y), b * std::sin(x.x) + a * std::cos(x.z), c * std::sin(x.y) + b * std::cos(x.x)};
   }
   KOKKOS_INLINE_FUNCTION Vec3 velocity(const Vec3& x, double t) const { return amplitude(t) * shape(x); }
   KOKKOS_INLINE_FUNCTION double pressure(const Vec3& x, double t) const {
@@ -72,15 +71,13 @@ struct Flow {
 inline void set_force(const GridViews& grid, const Flow& flow, double t, const Components<double>& force) {
   const auto x = grid.x;
   Kokkos::parallel_for(
-      "corpuscle::test::force", Policy(0, grid.index.size()),
-      KOKKOS_LAMBDA(int e) { store(force, e, flow.force(load(x, e), t)); });
+      "corpuscle::test::force", Policy(0, grid.index.size()), KOKKOS_LAMBDA(int e) { store(force, e, flow.force(load(x, e), t)); });
 }
 
 inline void set_velocity(const GridViews& grid, const Flow& flow, double t, const Components<double>& u) {
   const auto x = grid.x;
   Kokkos::parallel_for(
-      "corpuscle::test::velocity", Policy(0, grid.index.size()),
-      KOKKOS_LAMBDA(int e) { store(u, e, flow.velocity(load(x, e), t)); });
+      "corpuscle::test::velocity", Policy(0, grid.index.size()), KOKKOS_LAMBDA(int e) { store(u, e, flow.velocity(load(x, e), t)); });
 }
 
 /// Exact fluxes by the mid-point rule, at the mean of the neighbouring centres.
@@ -92,8 +89,7 @@ inline void set_face_flux(const GridViews& grid, const Flow& flow, double t, con
     const auto f = flux[d];
     const int stride = index.stride(d);
     for_box(
-        "corpuscle::test::flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1},
-        KOKKOS_LAMBDA(int i, int j, int k) {
+        "corpuscle::test::flux", {0, 0, 0}, {index.n[0] + 1, index.n[1] + 1, index.n[2] + 1}, KOKKOS_LAMBDA(int i, int j, int k) {
           const int c = index.cell(i, j, k);
           const Vec3 u = 0.5 * (flow.velocity(load(x, c), t) + flow.velocity(load(x, c - stride), t));
           f(c) = dot(load(area, c), u);
@@ -106,8 +102,7 @@ inline NodeSource skewed_cube(int cells) {
   return {{cells, cells, cells}, [cells](int i, int j, int k) {
             const double s = 2.0 / cells, u = s * i, v = s * j, w = s * k, pi = std::acos(-1.0);
             const double bump = 0.06 * std::sin(pi * u) * std::sin(pi * v) * std::sin(pi * w);
-            return Triple{u + 0.35 * v + bump + 0.05 * std::sin(pi * w), v + 0.2 * w - bump,
-                          w + 0.15 * u + bump + 0.04 * std::sin(pi * v)};
+            return Triple{u + 0.35 * v + bump + 0.05 * std::sin(pi * w), v + 0.2 * w - bump, w + 0.15 * u + bump + 0.04 * std::sin(pi * v)};
           }};
 }
 
@@ -147,8 +142,8 @@ inline Errors difference(const Comm& comm, const NodeSource& source, const Field
 /// All sides prescribe the exact velocity. Returns volume-weighted rms errors at the end; pressure up to its mean.
 /// @param dt     mean length of the steps
 /// @param ratio  of every second step's length to the others'
-inline Errors run(const Comm& comm, const NodeSource& source, double dt, int steps, FluidSettings settings,
-                  Fields* fields = nullptr, Flow flow = {}, double ratio = 1) {
+inline Errors run(const Comm& comm, const NodeSource& source, double dt, int steps, FluidSettings settings, Fields* fields = nullptr,
+                  Flow flow = {}, double ratio = 1) {
   Grid grid(comm, source, {false, false, false});
   flow.convective = settings.convection != FluidSettings::Convection::none;
   settings.density_pg_per_um3 = flow.rho;

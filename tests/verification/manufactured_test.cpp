@@ -24,9 +24,8 @@ void show(const std::string& text) {
 }
 
 std::string name(const FluidSettings& s) {
-  return fmt::format(
-      "convection {}",
-      s.convection == Convection::none ? "none" : (s.convection == Convection::implicit ? "implicit" : "extrapolated"));
+  return fmt::format("convection {}",
+                     s.convection == Convection::none ? "none" : (s.convection == Convection::implicit ? "implicit" : "extrapolated"));
 }
 
 }  // namespace

@@ -76,10 +76,8 @@ TubeErrors developed_flow(int across, int along, Map map, double ramp, double dt
   TubeErrors errors = errors_at(solver, static_cast<int>(0.7 * along));
   errors.divergence = divergence;
   if (std::getenv("CORPUSCLE_SHOW"))
-    WARN(
-        fmt::format("{} x {} x {} {}: velocity {:.3e} at most, {:.3e} rms, pressure gradient {:.3e}, divergence {:.1e}",
-                    across, across, along, map == Map::conformal ? "conformal" : "elliptical", errors.largest,
-                    errors.rms, errors.gradient, divergence));
+    WARN(fmt::format("{} x {} x {} {}: velocity {:.3e} at most, {:.3e} rms, pressure gradient {:.3e}, divergence {:.1e}", across, across,
+                     along, map == Map::conformal ? "conformal" : "elliptical", errors.largest, errors.rms, errors.gradient, divergence));
   return errors;
 }
 
@@ -97,8 +95,7 @@ void check_order(const std::vector<int>& grids, Map map) {
   CHECK(fitted_order(spacing, rms) >= 1.9);
   CHECK(fitted_order(spacing, largest) >= 1.9);
   CHECK(fitted_order(spacing, gradient) >= 1.9);
-  CHECK(rms.back() * std::pow(grids.back(), 2) <
-        2.5);  // twice the constant of the h^2 law measured on the conformal grid
+  CHECK(rms.back() * std::pow(grids.back(), 2) < 2.5);  // twice the constant of the h^2 law measured on the conformal grid
 }
 
 }  // namespace
