@@ -22,7 +22,7 @@ PAGES = sorted((ROOT / "docs").glob("*.md"))
 MORE = {"obstacle": ["time.end_us=20"], "two_cells": ["time.end_us=20"], "couette": ["time.end_us=40"], "tube_flow": ["time.end_us=8"], "stretch": ["stretching.steps=2"],
         "uniform_flow": ["time.end_us=8"]}
 # Entries whose own keys are of the scene.
-OPEN = {"left_out_cost", "left_out", "populations", "warnings", "told", "error_bars", "modules", "error_estimate", "libraries"}
+OPEN = {"left_out_cost", "left_out", "populations", "warnings", "told", "error_bars", "modules", "error_estimate", "libraries", "machine"}
 
 
 def run(command, folder, environment):

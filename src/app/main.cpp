@@ -1,4 +1,5 @@
 // corpuscle: the command line.
+#include "app/page.hpp"
 #include "app/run.hpp"
 #include "app/waiting.hpp"
 #include "core/device_layout.hpp"
@@ -96,11 +97,12 @@ void return_freed_arrays() {
 }
 
 struct Command {
-  enum class Kind { run, check, mesh, keys } kind = Kind::run;
+  enum class Kind { run, check, mesh, keys, report } kind = Kind::run;
   RunOptions options;
   int vertices = 0;
   std::string mesh_path;
   std::string section;
+  std::string results, page;
   bool markdown = false, resolved = false;
 };
 
@@ -155,13 +157,21 @@ Command parse(CLI::App& app, int argc, char** argv) {
   auto* of = keys->add_option("section", command.section, "only this one: time, grid, fluid, boundary, cells, ...");
   keys->add_flag("--markdown", command.markdown, "all of them as the tables of docs/keys.md")->excludes(of);
 
+  auto* report = app.add_subcommand("report", "write DIR/report.html: results, errors, times and pictures of a run on one page");
+  report->add_option("folder", command.results, "folder of results")->required();
+  report->add_option("--out", command.page, "the page to write, in place of DIR/report.html");
+
   std::vector<std::string> words;  // last first, as the parser wants them; Kokkos takes its own options
   for (int n = argc - 1; n > 0; --n)
     if (std::string(argv[n]).rfind("--kokkos-", 0) != 0) words.push_back(argv[n]);
   if (!words.empty()) check_command(app, words.back());
   app.parse(words);
   for (const auto* used : app.get_subcommands()) check_values(*used);
-  command.kind = *run ? Command::Kind::run : *check ? Command::Kind::check : *mesh ? Command::Kind::mesh : Command::Kind::keys;
+  command.kind = *run      ? Command::Kind::run
+                 : *check  ? Command::Kind::check
+                 : *mesh   ? Command::Kind::mesh
+                 : *report ? Command::Kind::report
+                           : Command::Kind::keys;
   return command;
 }
 
@@ -172,7 +182,7 @@ bool can_stay_alone(Command& command) {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID", "PALS_RANKID",
                            "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
     if (std::getenv(name)) return false;
-  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys) return true;
+  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys || command.kind == Command::Kind::report) return true;
   try {
     const auto file = load_case_file(command.options.case_path);
     command.options.case_text = file.text;
@@ -198,6 +208,8 @@ int execute(const Comm& comm, const Command& command) {
       case Command::Kind::mesh:
         write_mesh(command.vertices, command.mesh_path);
         break;
+      case Command::Kind::report:
+        make_page(command.results, command.page);
       case Command::Kind::keys:
         log_text(command.markdown ? keys_markdown() : keys_text(command.section));
         break;

@@ -62,6 +62,7 @@ void write_report(const std::string& folder, const Comm& comm, const Report& rep
   json["git"] = git_hash();
   json["backend"] = backend_name();
   json["kokkos"] = kokkos_configuration();
+  for (const auto& [name, value] : machine()) json["machine"][name] = value;
   for (const auto& [name, version] : libraries()) json["libraries"][name] = version;
   json["ranks"] = report.ranks > 0 ? report.ranks : comm.size();
   if (!report.stopped.empty()) json["stopped"] = report.stopped;

@@ -2,6 +2,11 @@
 
 #include <HYPRE_config.h>
 #include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <algorithm>
+#include <fstream>
+#include <thread>
 
 #include "common/types.hpp"
 
@@ -54,6 +59,22 @@ std::vector<std::pair<std::string, std::string>> libraries() {
           {"hypre", HYPRE_RELEASE_VERSION},
           {"MPI", mpi_version()},
           {"HDF5", hdf5_version()}};
+}
+
+std::vector<std::pair<std::string, std::string>> machine() {
+  utsname names{};
+  uname(&names);
+  std::string processor = names.machine;
+  std::ifstream cpu("/proc/cpuinfo");
+  for (std::string line; std::getline(cpu, line);)
+    if (line.rfind("model name", 0) == 0) {
+      processor = line.substr(std::min(line.size(), line.find(':') + 2));
+      break;
+    }
+  return {{"host", names.nodename},
+          {"processor", processor},
+          {"cores", std::to_string(std::thread::hardware_concurrency())},
+          {"system", fmt::format("{} {}", names.sysname, names.release)}};
 }
 
 std::string version_text() {

@@ -15,7 +15,9 @@ std::string git_hash();
 std::string backend_name();
 /// The libraries with their versions; "none" for one that this build does without.
 std::vector<std::pair<std::string, std::string>> libraries();
-/// All of it, a line each.
+/// Host, processor, cores and system, as far as they can be told.
+std::vector<std::pair<std::string, std::string>> machine();
+/// Program and libraries, a line each.
 std::string version_text();
 
 }  // namespace corpuscle
