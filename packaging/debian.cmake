@@ -1,0 +1,18 @@
+# A Debian package of the program, its cases and its manual: cpack --config build/package/CPackConfig.cmake
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME corpuscle)
+set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
+set(CPACK_PACKAGE_CONTACT "Corpuscle contributors")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Red blood cells in flowing plasma")
+set(CPACK_PACKAGE_DESCRIPTION "An immersed-boundary Navier-Stokes solver on curvilinear grids coupled to membranes of red blood cells:
+ single cells and capsules to blood of many cells, on threads and ranks. A scene is a text file; results open in ParaView.")
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_COMPONENTS_ALL program)
+set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "openmpi-bin, python3-h5py, python3-matplotlib")
+include(CPack)
