@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string>
 
 namespace corpuscle {
 
@@ -143,6 +144,22 @@ nlohmann::json judge(const nlohmann::json& errors, const FigureScales& scales) {
                         {"message", fmt::format("{} = {:.3g}, {} than {:g}: {}", figure, value, least ? "less" : "more", level, message)}});
   }
   return warnings;
+}
+
+std::string worst_figure(const nlohmann::json& errors, const FigureScales& scales) {
+  constexpr double beyond = 1e300;  // a level of nothing, and what is not a number
+  double most = -1;
+  std::string text;
+  for (const auto& [figure, level, least, of, key, message] : levels) {
+    const auto found = errors.find(figure);
+    if (found == errors.end() || !found->is_number() || !applies(of, scales)) continue;
+    const double value = found->get<double>(), share = least ? level / value : value / level;
+    const double ratio = value == 0 && level == 0 ? 0 : std::isfinite(share) ? share : beyond;
+    if (ratio <= most) continue;
+    most = ratio;
+    text = fmt::format("{} {:.2g} (bad {} {:g})", figure, value, least ? "below" : "above", level);
+  }
+  return text;
 }
 
 }  // namespace corpuscle

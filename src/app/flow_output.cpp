@@ -290,6 +290,18 @@ void FlowOutput::fill_totals(Report& report, RunTotals now) const {
   report.wall_s_this_run = now.wall_s - totals_.wall_s;
 }
 
+std::string FlowOutput::worst_error() const {
+  nlohmann::json errors{{"max_divergence", totals_.divergence}, {"flux_correction", totals_.flux_correction}};
+  if (totals_.splitting_until_us > 0) errors["splitting"] = totals_.splitting_us / totals_.splitting_until_us;
+  if (simulation_.immersed()) errors["slip"] = totals_.slip();
+  if (simulation_.membranes()) {
+    errors["volume_drift"] = totals_.volume_drift;
+    if (simulation_.membranes()->any_holds_area()) errors["area_drift"] = totals_.area_drift;
+  }
+  if (const auto whole = energy_.imbalance()) errors["energy_balance"] = *whole;
+  return worst_figure(errors, scales_of(record()));
+}
+
 void FlowOutput::fill_broken(Report& report, bool together) {
   if (end_energy_) energy_.resume(*end_energy_);
   fill_totals(report, totals_now(together));

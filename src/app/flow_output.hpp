@@ -35,6 +35,8 @@ class FlowOutput {
   void started_from(const std::string& checkpoint, const RunTotals& totals, const std::vector<std::string>& changed);
   /// Errors, iterations, counts and times gathered over the run, and over those that it goes on from.
   void fill(Report& report);
+  /// Of the errors that are known between steps, the one nearest to where it is bad, or furthest beyond. No rank waits for another.
+  std::string worst_error() const;
   /// The same where the state is of no use.
   /// @param together  all ranks call; otherwise what this one knows
   void fill_broken(Report& report, bool together);

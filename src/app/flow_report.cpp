@@ -160,10 +160,17 @@ void report_totals(const FlowRecord& record, const RunTotals& now, Report& repor
   report.simulated_us = simulation.time();
 }
 
+FigureScales scales_of(const FlowRecord& record) {
+  return {record.simulation.fluid().statistics().reference_speed,
+          record.energy.largest_fJ(),
+          record.scene.fluid->convection == FluidSettings::Convection::none,
+          false,
+          record.simulation.shared_cells() != nullptr,
+          record.scene.contact.has_value()};
+}
+
 void judge_figures(const FlowRecord& record, Report& report) {
-  report.warnings = judge(report.errors, {record.simulation.fluid().statistics().reference_speed, record.energy.largest_fJ(),
-                                          record.scene.fluid->convection == FluidSettings::Convection::none, false,
-                                          record.simulation.shared_cells() != nullptr, record.scene.contact.has_value()});
+  report.warnings = judge(report.errors, scales_of(record));
   const SurfaceSet* surfaces = record.simulation.surfaces();
   name_cell(record.scene, surfaces ? surfaces->names : nullptr, record.widest, report.warnings);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "app/body_history.hpp"
+#include "app/figure_levels.hpp"
 #include "app/run_totals.hpp"
 #include "coupling/energy_balance.hpp"
 #include "output/report.hpp"
@@ -22,6 +23,8 @@ struct FlowRecord {
 void report_totals(const FlowRecord& record, const RunTotals& totals, Report& report);
 /// What the present state adds, once a run has come to its end. All ranks call.
 void report_state(const FlowRecord& record, Report& report);
+/// What the scene's error figures are shares of, as far as this rank knows.
+FigureScales scales_of(const FlowRecord& record);
 /// Warnings about error figures, from those that are there.
 void judge_figures(const FlowRecord& record, Report& report);
 

@@ -160,7 +160,7 @@ std::string advance(FlowSimulation& simulation, FlowOutput& output, StopSignal& 
     if (const auto name = signal.asked(); !name.empty()) return name;
     simulation.step();
     output.after_step();
-    progress.update(simulation.steps() - first, simulation.time());
+    progress.update(simulation.steps() - first, simulation.time(), [&] { return output.worst_error(); });
     if (simulation.at_outflow()) break;
   }
   return "";

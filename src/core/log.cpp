@@ -2,6 +2,7 @@
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -83,16 +84,27 @@ void log_error(const std::string& message, bool everywhere) {
   log.err.error("error: " + message);
 }
 
-std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s) {
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst) {
   const double percent = end_us > 0 ? std::floor(1000 * std::min(1.0, time_us / end_us)) / 10 : 100;
-  return fmt::format("{:.1f} %  {:g} of {:g} us  {:.3g} steps/s  {}", percent, time_us, end_us, steps_per_s,
-                     left_s < 0 ? "" : duration_text(left_s) + " left");
+  std::string text = fmt::format("{:.1f} %  {:g} of {:g} us  {:.3g} steps/s  {}", percent, time_us, end_us, steps_per_s,
+                                 left_s < 0 ? "" : duration_text(left_s) + " left");
+  if (!worst.empty()) text += "  " + worst;
+  return text;
 }
+
+namespace {
+
+std::size_t columns_of_terminal() {
+  winsize size{};
+  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
+}
+
+}  // namespace
 
 Progress::Progress(double end_us, long steps)
     : end_us_(end_us), steps_(steps), terminal_(isatty(STDOUT_FILENO) == 1), shown_(Clock::now()) {}
 
-void Progress::update(long step, double time_us) {
+void Progress::update(long step, double time_us, const std::function<std::string()>& worst) {
   auto& log = state();
   if (!log.root || log.quiet) return;
   const double since = std::chrono::duration<double>(Clock::now() - shown_).count();
@@ -101,9 +113,11 @@ void Progress::update(long step, double time_us) {
   rate_ = rate_ > 0 ? 0.7 * rate_ + 0.3 * rate : rate;
   shown_ = Clock::now();
   shown_step_ = step;
-  const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0);
+  const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0, worst());
   if (terminal_) {
-    std::fputs(fmt::format("\r{:<78}", text).c_str(), stdout);  // a terminal that is gone stops no run
+    // The rest of the line is erased; one that is too long for the terminal would leave its first half behind.
+    std::fputs(fmt::format("\r{}\033[K", text.substr(0, columns_of_terminal() - 1)).c_str(),
+               stdout);  // a terminal that is gone stops no run
     std::fflush(stdout);
     log.line_open = true;
   } else {

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,9 +40,10 @@ void warn(fmt::format_string<Args...> format, Args&&... args) {
   log_warning(fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left"
+/// "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left  energy_balance 0.01 (bad above 0.05)"
 /// @param left_s  negative while there is no estimate yet
-std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s);
+/// @param worst   of what is known of errors so far
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst = "");
 
 /// The progress line: rewritten in place on a terminal, otherwise a new line every ten seconds.
 class Progress {
@@ -53,7 +55,8 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   /// After each step: `step` of this run, 1 to `steps`.
-  void update(long step, double time_us);
+  /// @param worst  asked for when the line is written
+  void update(long step, double time_us, const std::function<std::string()>& worst);
   /// End the line. Called by the destructor as well.
   void finish();
 

@@ -193,4 +193,5 @@ TEST_CASE("the progress line") {
   REQUIRE(progress_text(123, 1000, 45.61, 80) == "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left");
   REQUIRE(progress_text(999.99, 1000, 2, 3700) == "99.9 %  999.99 of 1000 us  2 steps/s  1 h 1 min left");
   REQUIRE_THAT(progress_text(0, 1000, 0, -1), !Contains("left"));
+  REQUIRE_THAT(progress_text(10, 1000, 2, 80, "slip 0.1 (bad above 0.15)"), Contains("1 min 20 s left  slip 0.1"));
 }
