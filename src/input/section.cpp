@@ -42,8 +42,12 @@ std::string toml_text(const std::string& text) {
   }
   return quoted + '"';
 }
-std::string toml_text(double value) { return fmt::format("{}", value); }
-std::string toml_text(const double* values, std::size_t n) { return fmt::format("[{}]", fmt::join(values, values + n, ", ")); }
+std::string toml_text(double value) { return fmt::format("{}", value + 0.0); }  // no -0: a whole number when it is read again
+std::string toml_text(const double* values, std::size_t n) {
+  std::string text;
+  for (std::size_t m = 0; m < n; ++m) text += (m > 0 ? ", " : "") + toml_text(values[m]);
+  return "[" + text + "]";
+}
 namespace {
 
 std::string whole_text(const toml::node& node) {
