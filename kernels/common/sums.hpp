@@ -23,7 +23,10 @@ struct Sums {
 
 }  // namespace corpuscle
 
+/// What Kokkos needs of a type to sum it.
+namespace Kokkos {
 template <int n>
-struct Kokkos::reduction_identity<corpuscle::Sums<n>> {
+struct reduction_identity<corpuscle::Sums<n>> {
   KOKKOS_FORCEINLINE_FUNCTION static corpuscle::Sums<n> sum() { return {}; }
 };
+}  // namespace Kokkos

@@ -99,7 +99,7 @@ class Coupling {
   /// Of the case's populations; null without any. And this rank's share of where they were packed, for checkpoints.
   virtual const PackingReport* packing() const { return nullptr; }
   virtual const PackedShare* packed() const { return nullptr; }
-  /// A checkpoint's cells are in shared_cells(). @param time_us  of the checkpoint
+  /// A checkpoint's cells are in shared_cells(). Takes the checkpoint's time, us.
   virtual void cells_restored(double /*time_us*/) {}
   /// Of the whole scene.
   virtual int cells() { return membranes() ? membranes()->cells() : 0; }
@@ -108,7 +108,7 @@ class Coupling {
   /// The search and the flow at surfaces that cut the grid, those of membranes that are shared out not among them; null where none does.
   virtual ImmersedFlow* immersed() { return nullptr; }
   /// Of cells on sides, past the fluid, nW: what spreads their forces reaches a side beside them.
-  /// @param of_sides  velocity [cell, 3], read on the sides of the block
+  /// Takes a velocity [cell, 3], read on the sides of the block.
   virtual double power_on_sides(const Components<double>&) { return 0; }
 };
 

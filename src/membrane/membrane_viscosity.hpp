@@ -15,9 +15,10 @@ namespace corpuscle {
 class MembraneViscosity {
  public:
   explicit MembraneViscosity(bool tangential);
-  /// Memory for these membranes; hold(): for those that a rank holds at present, which move with the fluid.
-  /// @param parts  of the cells, which are dealt with one after the other
+  /// Memory for these membranes.
   void make_room(const MembraneViews& m);
+  /// The same for those that a rank holds at present, which move with the fluid.
+  /// @param parts  of the cells, which are dealt with one after the other
   void hold(const MembraneViews& m, const std::vector<CellPart>& parts);
   /// Before hold(): matrices of these are factorised, unless they are too large for that.
   void prepare(const std::vector<CellReference>& types);

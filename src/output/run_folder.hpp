@@ -23,7 +23,7 @@ struct Continued {
 class RunFolder {
  public:
   /// Claims the folder for as long as this lives; rank 0 does the work.
-  /// @param named      by the user; empty: runs/<case_name>-001 or the first number that is free
+  /// @param named      by the user; empty: runs/CASE-001 or the first number that is free
   /// @param continued  for a restart
   /// @throws InputError  on every rank: it cannot be made or written in, another run uses it, or it holds results that
   ///                     `earlier` does not allow for, or that the checkpoint is not of

@@ -16,7 +16,7 @@
 
 namespace corpuscle {
 
-/// One stored time of a series: a group of <name>.h5, which is a link to a file's root.
+/// One stored time of a series: a group of NAME.h5, which is a link to a file's root.
 struct StoredTime {
   std::string group;  // "step_000000100"
   double time_us;
@@ -32,12 +32,12 @@ std::vector<StoredTime> stored_times(const std::string& path, const std::string&
 /// Rank 0 writes what is said of the files here; the files themselves are their writers'.
 class Series {
  public:
-  /// Content of a stored time's <Grid>, from its file.
+  /// Content of a stored time's grid element, from its file.
   using Describe = std::function<std::string(const StoredTime&, const Hdf5File&)>;
 
   /// @param name    "fields": of the folder and of both files beside it
-  /// @param format  what <name>.h5 says it is
-  /// @param shared  arrays that all times share, of <name>/<shared_file>.h5
+  /// @param format  what NAME.h5 says it is
+  /// @param shared  arrays that all times share, of NAME/SHARED_FILE.h5
   Series(const std::string& folder, const std::string& name, const std::string& format, const Comm& comm, const std::string& shared_file,
          const std::vector<std::string>& shared, Describe describe);
 
