@@ -157,7 +157,7 @@ def program(report):
 
 def page_of(folder, report):
     title = report.get("title") or report["case"]
-    case = folder / "case.toml"
+    case = folder / "resolved.toml"
     text = case.read_text() if case.exists() else report.get("resolved_case", "")
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{escaped(title)}</title><style>{STYLE}</style></head><body>

@@ -84,6 +84,15 @@ def main():
         assert len(ours) == 20, len(ours)
         assert theirs[-len(ours):] and all(abs(a - b) <= 1e-9 * max(theirs) for a, b in zip(theirs[-len(ours):], ours)), (theirs, ours)
         assert ours[-1] > 1e-3 and 6.3 < harder[0][-1] < harder[1][-1] - 0.02, harder
+        page = start(tree / "bin" / "corpuscle", "report", work / "out")
+        assert (work / "out" / "report.html").stat().st_size > 10000, page
+        for asked, languages, words in (("9.0", "C CXX", "9.0"), ("0.1", "CXX", "LANGUAGES C CXX")):
+            refused = work / f"refused_{asked}"
+            refused.mkdir()
+            (refused / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.21)\nproject(refused LANGUAGES {languages})\n"
+                                                    f"find_package(corpuscle {asked} REQUIRED)\n")
+            said = subprocess.run(["cmake", "-S", refused, "-B", refused / "build", f"-DCMAKE_PREFIX_PATH={tree}", *same], capture_output=True, text=True)
+            assert said.returncode != 0 and words in said.stderr, said.stderr
         # As a folder of another project: configured, its targets known; compiling it again would take minutes.
         (work / "parent").mkdir()
         (work / "parent" / "CMakeLists.txt").write_text(

@@ -157,7 +157,7 @@ std::string worst_figure(const nlohmann::json& errors, const FigureScales& scale
     const double ratio = value == 0 && level == 0 ? 0 : std::isfinite(share) ? share : beyond;
     if (ratio <= most) continue;
     most = ratio;
-    text = fmt::format("{} {:.2g} (bad {} {:g})", figure, value, least ? "below" : "above", level);
+    text = fmt::format("{} {:.2g} of {:g}", figure, value, level);
   }
   return text;
 }

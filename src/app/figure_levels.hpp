@@ -24,7 +24,7 @@ struct FigureScales {
 ///                are bad
 nlohmann::json judge(const nlohmann::json& errors, const FigureScales& scales);
 
-/// The figure that comes nearest to where it is bad, or is furthest beyond: "energy_balance 0.01 (bad from 0.05)"; "" without any.
+/// The figure that comes nearest to where it is bad, or is furthest beyond, and that level: "energy_balance 0.01 of 0.05"; "" without any.
 std::string worst_figure(const nlohmann::json& errors, const FigureScales& scales);
 
 }  // namespace corpuscle

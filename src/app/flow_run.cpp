@@ -218,8 +218,8 @@ Ending run_flow(const Comm& comm, Case scene, const RunOptions& options, const P
   try {
     output = std::make_unique<FlowOutput>(place, std::move(scene), simulation, timers,
                                           totals ? std::optional(simulation.time()) : std::nullopt, start);
+    place.settle();
     if (totals) {
-      on_root(comm, [&] { std::filesystem::remove(place.folder + "/report.json"); });  // of the run until the checkpoint
       output->started_from(options.restart, *totals, changed);
     } else {
       output->after_step(true);

@@ -182,7 +182,7 @@ bool can_stay_alone(Command& command) {
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_PROCID", "PALS_RANKID",
                            "ALPS_APP_PE", "FLUX_TASK_RANK", "JSM_NAMESPACE_RANK"})
     if (std::getenv(name)) return false;
-  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys || command.kind == Command::Kind::report) return true;
+  if (command.kind == Command::Kind::mesh || command.kind == Command::Kind::keys) return true;
   try {
     const auto file = load_case_file(command.options.case_path);
     command.options.case_text = file.text;
@@ -192,6 +192,19 @@ bool can_stay_alone(Command& command) {
   }
 }
 #endif
+
+/// Needs neither MPI nor a device. Under a launcher the first process does it. @return how it has failed
+int page_of_results(const Command& command) {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID", "SLURM_PROCID"})
+    if (const char* rank = std::getenv(name); rank && std::string(rank) != "0") return exit_done;
+  open_log(true);
+  try {
+    make_page(command.results, command.page);
+  } catch (const InputError& error) {
+    log_error(error.what());
+  }
+  return exit_input_wrong;
+}
 
 int execute(const Comm& comm, const Command& command) {
   return run_command(comm, [&]() -> int {
@@ -209,7 +222,7 @@ int execute(const Comm& comm, const Command& command) {
         write_mesh(command.vertices, command.mesh_path);
         break;
       case Command::Kind::report:
-        make_page(command.results, command.page);
+        break;  // has been made, without MPI and Kokkos
       case Command::Kind::keys:
         log_text(command.markdown ? keys_markdown() : keys_text(command.section));
         break;
@@ -234,6 +247,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     refused = std::make_unique<CLI::ParseError>(error);
   }
+  if (!refused && command.kind == Command::Kind::report) return page_of_results(command);
 #ifdef CORPUSCLE_MPI
   const bool alone = can_stay_alone(command);
   setenv("OMPI_MCA_ess_singleton_isolated", "1",

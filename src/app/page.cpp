@@ -15,16 +15,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// In an installed tree beside the program; else where the source was.
+/// In an installed tree beside the program; of a build where the source is.
 std::string find_script() {
   std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  const std::vector<fs::path> places{program.parent_path().parent_path() / "share/corpuscle/cases/report.py",
-                                     fs::path(CORPUSCLE_SOURCE) / "cases/report.py"};
-  for (const auto& place : places)
-    if (fs::exists(place, ignored)) return place.string();
-  throw InputError(fmt::format("report: {} is not there, nor {}: install the program with cmake --install, or keep its source",
-                               places[0].string(), places[1].string()));
+  const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
+  const bool built = folder == fs::path(CORPUSCLE_BUILD);
+  const fs::path script = ((built ? fs::path(CORPUSCLE_SOURCE) : folder / CORPUSCLE_SHARE) / "cases/report.py").lexically_normal();
+  if (!folder.empty() && fs::exists(script, ignored)) return script.string();
+  throw InputError(
+      fmt::format("report: {} is not there: it comes with the program (cmake --install), or lies in its source: python3 "
+                  "cases/report.py DIR does the same",
+                  script.string()));
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ ExitCode compare(const Comm& comm, const Bars& bars, const CoarserRun& run, cons
     require_same_files(main.files, files);
     const auto begin = [&] { on_root(comm, [&] { prepare_folder(own_folder), remove_results(own_folder); }); };
     open_log(comm.root(), true);
-    const Ending ending = run_scene(comm, std::move(coarser), {}, {own_folder, begin, main.run + "-" + run.kind, files});
+    const Ending ending = run_scene(comm, std::move(coarser), {}, {own_folder, begin, [] {}, main.run + "-" + run.kind, files});
     open_log(comm.root());
     if (ending.code != exit_done) reason = ending.report.stopped;
     if (ending.code == exit_stopped) code = exit_stopped;
@@ -184,11 +184,23 @@ std::optional<Continued> continued([[maybe_unused]] const std::string& checkpoin
   return std::nullopt;
 }
 
+constexpr const char* resolved_name = "resolved.toml";
+
+/// A run from the case that lies among its results would remove what it is made from.
+void keep_case_file(const RunOptions& options) {
+  std::error_code ignored;
+  const auto among = std::filesystem::path(options.folder) / resolved_name;
+  if (!options.folder.empty() && options.restart.empty() && std::filesystem::equivalent(options.case_path, among, ignored))
+    throw InputError(fmt::format("--out {}: {} lies there among the results of an earlier run: copy it, or choose another folder",
+                                 options.folder, resolved_name));
+}
+
 /// The text of a case file that stands for the case and its overrides.
 std::string resolved_file(const RunOptions& options, const Case& scene) {
   std::string from = options.case_path;
   for (const auto& override_text : options.overrides) from += " --set " + override_text;
-  std::replace(from.begin(), from.end(), '\n', ' ');
+  const auto control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };  // which TOML has none of in comments
+  std::replace_if(from.begin(), from.end(), control, ' ');
   return fmt::format("# {}\n# with every key that has a value in it, as corpuscle {} took them.\n{}", from, git_hash(),
                      resolved_text(scene));
 }
@@ -201,6 +213,7 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
   Case scene = read_case(file, options.overrides);
   const MemoryEstimate memory = require_memory(comm, scene);
   check_options(comm, scene, options);
+  keep_case_file(options);
   const auto coarser = options.estimate.empty() ? std::vector<CoarserRun>{} : coarser_runs(scene, options.estimate);
   const auto earlier = options.overwrite         ? EarlierResults::overwrite
                        : options.restart.empty() ? EarlierResults::refuse
@@ -210,11 +223,14 @@ ExitCode run_case(const Comm& comm, const RunOptions& asked) {
   print_start(comm, scene);
   info("memory:   {}", memory_text(memory, comm.size()));
   announce_set_up(measure_scene(scene, comm.size()));
-  const auto begin = [&, text = resolved_file(options, scene)] {
-    folder.begin();
-    on_root(comm, [&] { replace_text_file((std::filesystem::path(folder.path()) / "case.toml").string(), text); });
+  const auto settle = [&, text = resolved_file(options, scene)] {
+    on_root(comm, [&] {
+      const std::filesystem::path results(folder.path());
+      for (const char* of_before : {"report.json", "report.html"}) std::filesystem::remove(results / of_before);
+      replace_text_file((results / resolved_name).string(), text);
+    });
   };
-  const Place place{folder.path(), begin, folder.run(), fingerprint_files(comm, scene)};
+  const Place place{folder.path(), [&] { folder.begin(); }, settle, folder.run(), fingerprint_files(comm, scene)};
   Ending ending = run_scene(comm, std::move(scene), options, place);
   if (!coarser.empty() && ending.code == exit_done)
     ending.code = estimate_errors(comm, {file, options.overrides, coarser}, place, ending.report);

@@ -13,8 +13,9 @@ namespace corpuscle {
 struct Place {
   std::string folder;
   std::function<void()> begin;
-  std::string run;    // its name, see RunFolder
-  std::string files;  // see fingerprint_files()
+  std::function<void()> settle;  // once all outputs are open: what is out of date goes, the case as it is run is written
+  std::string run;               // its name, see RunFolder
+  std::string files;             // see fingerprint_files()
 };
 
 /// How a run has ended, other than by an error.

@@ -89,6 +89,7 @@ Ending run_stretching(const Comm& comm, const Case& scene, const Place& place) {
     cells = std::make_unique<CellWriter>(folder, comm, triangles, std::vector<std::int32_t>(set.triangles, 0), set.vertices);
   }
 #endif
+  place.settle();
   timers.start("relaxation");
   long number = 0;
   const auto write = [&](const StretchingStep& step) {

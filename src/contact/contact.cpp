@@ -230,13 +230,13 @@ StepWays Contact::choose_motion(const TriangleBounds& bounds, double dt) {
 
 /// Anew where something may have come from beyond the skin. It is wide enough for several steps at the present speed.
 /// @param ways  from the present lists to the end of the next step
-void Contact::make_lists(const StepWays& ways, double dt) {
+void Contact::make_lists(const StepWays& ways, double dt, bool at_start) {
   constexpr double steps = 6, least = 0.5;  // of the range
   constexpr double skins = 4, drifts = 8;   // of which vertices may drift
   if (surface_.vertices == 0) return;       // on this rank, at present
   if (lists_hold(ways, dt)) return;
   const TriangleBounds bounds = bounds_of_triangles(surface_);
-  refuse_far_away(bounds);
+  refuse_far_away(bounds, at_start);
   copy_rounded(surface_.vertices, surface_.x, listed_);
   const StepWays ahead = choose_motion(bounds, dt);
   const double way = ahead.whole + 0.5 * steepest_ * dt * (reach_.other + 2 * bounds.radius);
@@ -412,7 +412,7 @@ void Contact::note_gaps() {
 
 void Contact::look_at_start(double dt) {
   step_ = dt;
-  make_lists(ways(dt), dt);
+  make_lists(ways(dt), dt, true);
   find_now();
   const auto found = crossings();
   if (found.vertices > 0)

@@ -102,7 +102,7 @@ class Contact {
   StepWays ways(double dt) const;
   bool lists_hold(const StepWays& ways, double dt) const;
   StepWays choose_motion(const TriangleBounds& bounds, double dt);
-  void make_lists(const StepWays& ways, double dt);
+  void make_lists(const StepWays& ways, double dt, bool at_start = false);
   void fill_lists(const ContactSearch& search, const ContactItems& items);
   ContactItems make_bins(double width, const TriangleBounds& bounds, std::size_t items);
   void find(const ContactViews& contacts);
@@ -114,7 +114,7 @@ class Contact {
   std::string crossing_text(int contact) const;
   std::string place_text(int vertex) const;
   std::string pair_text(int vertex, int item) const;
-  void refuse_far_away(const TriangleBounds& bounds) const;
+  void refuse_far_away(const TriangleBounds& bounds, bool at_start) const;
   StepWays refuse_runaways(double time_us, double dt);
   void refuse_fast_passage(double time_us, double dt);
   void refuse(const LongestWay& found, double most, const std::function<std::string()>& text) const;

@@ -36,18 +36,19 @@ int countable_items(std::int64_t items) {
 }
 
 /// Lists are of places in single precision: where those are no finer than the range, all is near to all.
-/// @throws ComputationError
-void Contact::refuse_far_away(const TriangleBounds& bounds) const {
+/// @throws InputError        before the first step
+/// @throws ComputationError  later
+void Contact::refuse_far_away(const TriangleBounds& bounds, bool at_start) const {
   constexpr double share = 0.1;  // of the range
   double furthest = 0;
   for (int d = 0; d < 3; ++d) furthest = std::max({furthest, -bounds.lower[d], bounds.upper[d]});
   const double apart = std::numeric_limits<float>::epsilon() * furthest;
-  if (apart > share * settings_.range_um)
-    throw ComputationError(
-        fmt::format("contact: a surface is {:.3g} um from the origin, where places are kept to {:.2g} um, too coarse for "
-                    "contact.range_um = {:g}. Likely cause: a step too long for the flow, or a load without bound: reduce "
-                    "time.step_us or the load, or move the grid to the origin",
-                    furthest, apart, settings_.range_um));
+  if (apart <= share * settings_.range_um) return;
+  const std::string found = fmt::format(
+      "contact: a surface is {:.3g} um from the origin, where places are kept to {:.2g} um, too coarse for contact.range_um = {:g}",
+      furthest, apart, settings_.range_um);
+  if (at_start) throw InputError(found + ": move the grid and all in it towards the origin (grid.lower_um, grid.upper_um, center_um)");
+  throw ComputationError(found + ". Likely cause: a step too long for the flow, or a load without bound: reduce time.step_us or the load");
 }
 
 /// Before lists are made: they reach as far as anything may come from, and would take in all of a scene that flies apart.

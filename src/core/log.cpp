@@ -84,12 +84,13 @@ void log_error(const std::string& message, bool everywhere) {
   log.err.error("error: " + message);
 }
 
-std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst) {
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst, std::size_t room) {
   const double percent = end_us > 0 ? std::floor(1000 * std::min(1.0, time_us / end_us)) / 10 : 100;
-  std::string text = fmt::format("{:.1f} %  {:g} of {:g} us  {:.3g} steps/s  {}", percent, time_us, end_us, steps_per_s,
-                                 left_s < 0 ? "" : duration_text(left_s) + " left");
-  if (!worst.empty()) text += "  " + worst;
-  return text;
+  const std::string begin = fmt::format("{:.1f} %  {:g} of {:g} us  ", percent, time_us, end_us),
+                    rate = fmt::format("{:.3g} steps/s  ", steps_per_s);
+  const std::string left = left_s < 0 ? "" : duration_text(left_s) + " left", end = worst.empty() ? left : left + "  " + worst;
+  const bool fits = begin.size() + rate.size() + end.size() <= room;
+  return (begin + (fits ? rate : "") + end).substr(0, room);
 }
 
 namespace {
@@ -113,7 +114,8 @@ void Progress::update(long step, double time_us, const std::function<std::string
   rate_ = rate_ > 0 ? 0.7 * rate_ + 0.3 * rate : rate;
   shown_ = Clock::now();
   shown_step_ = step;
-  const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0, worst());
+  const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0, worst(),
+                                  terminal_ ? columns_of_terminal() - 1 : 1000);
   if (terminal_) {
     // The rest of the line is erased; one that is too long for the terminal would leave its first half behind.
     std::fputs(fmt::format("\r{}\033[K", text.substr(0, columns_of_terminal() - 1)).c_str(),

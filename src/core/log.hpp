@@ -40,10 +40,12 @@ void warn(fmt::format_string<Args...> format, Args&&... args) {
   log_warning(fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left  energy_balance 0.01 (bad above 0.05)"
+/// "12.3 %  123 of 1000 us  45.6 steps/s  1 min 20 s left  energy_balance 0.01 of 0.05"
 /// @param left_s  negative while there is no estimate yet
 /// @param worst   of what is known of errors so far
-std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst = "");
+/// @param room    for so many letters: what is too long lacks the rate, and then its end
+std::string progress_text(double time_us, double end_us, double steps_per_s, double left_s, const std::string& worst = "",
+                          std::size_t room = 1000);
 
 /// The progress line: rewritten in place on a terminal, otherwise a new line every ten seconds.
 class Progress {

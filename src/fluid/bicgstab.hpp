@@ -30,8 +30,9 @@ KrylovResult bicgstab(System& system, double square, double tolerance, int max_i
   while (true) {
     if (result.residual <= tolerance) return result.converged = true, result;
     if (result.iterations >= max_iterations || !std::isfinite(result.residual)) return result;
-    ++result.iterations;
     const double alpha = rho / system.apply_p();
+    if (!std::isfinite(alpha)) return result;
+    ++result.iterations;
     result.residual = std::sqrt(system.advance_v(alpha));
     if (result.residual <= tolerance) continue;
     const auto [along, whole] = system.apply_r();

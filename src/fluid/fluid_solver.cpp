@@ -316,7 +316,7 @@ void FluidSolver::project(const EmbeddedBodies* bodies) {
   for (int round = 0;; ++round) {
     negative_divergence(grid_->views(), kind_, flux_, negative_divergence_);
     const double largest = grid_->comm().max(largest_magnitude(negative_divergence_));
-    statistics_.divergence = largest;
+    statistics_.divergence = largest + 0.0;  // no -0
     if (largest <= (round > 0 ? 1.5 * target : 0.0)) break;
     const auto result = round < rounds ? solve_pressure(round > 0 ? target : share * target) : KrylovResult{};
     statistics_.pressure_iterations += result.iterations;

@@ -178,7 +178,7 @@ std::string keys_markdown() {
       "`title`, a text in quotes. `--set section.key=value` overrides a key for one run (`--set cells.0.vertices=1000` for the first of a "
       "list), "
       "`corpuscle check --resolved CASE` prints a case with every default filled in, and every run keeps that in its folder as "
-      "`case.toml`. "
+      "`resolved.toml`. "
       "A key that means nothing in a scene is refused or named with a warning, and one that is misspelt with what it is like.\n";
   for (const auto& s : list_keys()) {
     text += fmt::format("\n## `{}`\n\n| key | unit | what it says | allowed | default |\n|---|---|---|---|---|\n", heading(s));

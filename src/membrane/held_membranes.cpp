@@ -130,6 +130,7 @@ std::unique_ptr<Membranes> Membranes::only(const std::vector<int>& numbers) cons
   std::vector<HeldCell> cells;
   for (int c : cells_of(numbers)) cells.push_back({type(c), number(c)});
   few->rest_at_size(size_);
+  few->make_law_ = make_law_;
   few->hold(cells, static_cast<int>(cells.size()));
   if (cells.empty()) return few;
   const Components<double> x = rows_of(numbers, views_.surface.x);

@@ -83,7 +83,7 @@ class Membranes {
   const Elasticity& elasticity() const { return *elasticity_; }
   /// From now on the cells' in-plane law is what `make` makes of it, in place of those that a case can name. Called at once, and
   /// whenever cells come or go. What was estimated of stiffness before is forgotten; what set-up took from it, such as the longest stable
-  /// step of membranes that are forces, is of the case's own law.
+  /// step of membranes that are forces, is of the case's own law. Before set_state().
   void take_law(ElasticityMaker make);
   /// In the plane of a cell's membrane.
   const MembraneLaw& law(int cell) const { return law_[cell]; }

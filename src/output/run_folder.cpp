@@ -25,9 +25,9 @@ namespace {
 
 constexpr const char* lock_name = ".corpuscle.lock";
 constexpr const char* run_name = ".corpuscle.run";
-const std::vector<std::string> result_files = {"report.json",      "history.csv",   "fields.h5",   "fields.xdmf", "cells.h5",
-                                               "cells.xdmf",       "checkpoint.h5", "blood.csv",   "blood.h5",    "cell_series.h5",
-                                               "cell_series.xdmf", "bodies.h5",     "bodies.xdmf", "case.toml",   "report.html"};
+const std::vector<std::string> result_files = {"report.json",      "history.csv",   "fields.h5",   "fields.xdmf",   "cells.h5",
+                                               "cells.xdmf",       "checkpoint.h5", "blood.csv",   "blood.h5",      "cell_series.h5",
+                                               "cell_series.xdmf", "bodies.h5",     "bodies.xdmf", "resolved.toml", "report.html"};
 
 std::string first_result(const fs::path& folder) {
   for (const auto& name : result_files)

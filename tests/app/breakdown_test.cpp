@@ -56,6 +56,23 @@ TEST_CASE("cells driven so fast that their places are too coarse for contact end
        3, {"broke down", "contact: a surface is", "um from the origin", "contact.range_um", "time.step_us"});
 }
 
+TEST_CASE("cells too far from the origin for contact are refused before the first step, wherever they are") {
+  const auto folder = fresh_folder("far_off");
+  for (const int d : {0, 1, 2})
+    for (const double way : {-3e5, 3e5}) {
+      const auto triple = [&](double x, double y, double z) {
+        const double place[3] = {x + (d == 0 ? way : 0), y + (d == 1 ? way : 0), z + (d == 2 ? way : 0)};
+        return fmt::format("[{}, {}, {}]", place[0], place[1], place[2]);
+      };
+      INFO(d << " " << way);
+      fail(folder,
+           {"check", CORPUSCLE_SOURCE_DIR "/cases/two_cells.toml", "--set", "grid.lower_um=" + triple(-6, -6, -6), "--set",
+            "grid.upper_um=" + triple(6, 6, 6), "--set", "cells.0.center_um=" + triple(0, 0, -1.6), "--set",
+            "cells.1.center_um=" + triple(0, 0, 1.6)},
+           2, {"contact: a surface is", "from the origin", "contact.range_um", "grid.lower_um"});
+    }
+}
+
 TEST_CASE("a run that breaks down on a grid too coarse for its cell names the grid, one on a fine grid does not") {
   const auto run = [](const std::string& nodes) {
     return coarse_tube(

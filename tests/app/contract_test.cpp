@@ -236,6 +236,22 @@ TEST_CASE("every case is valid as it is, and lists what it uses and leaves out")
   for (const auto& entry : fs::directory_iterator(folder)) REQUIRE(entry.path().filename() == "screen.txt");
 }
 
+TEST_CASE("resolved.toml beside the results is the run again, and is not run over itself") {
+  const auto folder = fresh_folder("resolved");
+  succeed(folder, coarse_tube("out", {"time.end_us=4", "output.fields=false"}));
+  const auto lines = history(folder / "out").lines;
+  succeed(folder, {"run", "out/resolved.toml", "--out", "again"});
+  CHECK(history(folder / "again").lines == lines);
+  fail(folder, {"run", "out/resolved.toml", "--out", "out", "--overwrite"}, 2, {"resolved.toml lies there", "copy it"});
+  CHECK(fs::exists(folder / "out" / "resolved.toml"));
+  CHECK(fs::exists(folder / "out" / "history.csv"));
+  // A case of the user's that lies in the folder is none of the results.
+  fs::copy_file(folder / "out" / "resolved.toml", folder / "again" / "case.toml");
+  succeed(folder, {"run", "again/case.toml", "--out", "again", "--overwrite"});
+  CHECK(fs::exists(folder / "again" / "case.toml"));
+  CHECK(history(folder / "again").lines == lines);
+}
+
 TEST_CASE("every key that scripts rely on is accepted, and used") {
   const auto folder = fresh_folder("keys");
   const auto require_used = [&](Words words, const Words& settings, const Words& lines) {

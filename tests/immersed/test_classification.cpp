@@ -372,6 +372,36 @@ TEST_CASE("faces lie between fluid and immersed nodes, once each, sorted by body
   }
 }
 
+TEST_CASE("a winding corridor is reached to its end, and what lies behind a wall is not", "[immersed]") {
+  IndexSpace index;
+  for (int d = 0; d < 3; ++d) index.n[d] = index.global[d] = 9;
+  const int size = index.size();
+  const NodeViews nodes{Array<NodeKind>("corpuscle::test::kind", size), Array<int>("corpuscle::test::body", size)};
+  BandViews band;
+  band.key = Array<Key>("corpuscle::test::key", size);
+  const Array<std::int8_t> reached("corpuscle::test::reached", size);
+  // In the plane k = 4, open at i = 0 and winding four times between j = 1 and 7: each turn takes a round of its own. A closed piece at its
+  // end.
+  const auto kind = nodes.kind;
+  for_owned(
+      "corpuscle::test::walls", index, KOKKOS_LAMBDA(int i, int j, int k) {
+        const bool turn = (i % 4 == 1 && j == 7) || (i % 4 == 3 && j == 1);
+        const bool corridor = k == 4 && j >= 1 && j <= 7 && i <= 6 && (i % 2 == 0 || turn);
+        const bool behind = k == 4 && i == 8 && j == 4;
+        kind(index.cell(i, j, k)) = corridor || behind ? NodeKind::fluid : NodeKind::immersed;
+      });
+  NodeBox box;
+  for (int d = 0; d < 3; ++d) box.lower[d] = 0, box.upper[d] = 8;
+  OpenFaces faces;
+  for (int d = 0; d < 3; ++d) faces.open[d][0] = faces.open[d][1] = false;
+  faces.open[0][0] = true;
+  seed_open_fluid(index, box, faces, band, nodes, reached);
+  CHECK(reach_all(index, box, nodes, reached) == 1);
+  const auto found = on_host(reached);
+  CHECK(found(index.cell(6, 7, 4)) == 1);
+  CHECK(found(index.cell(8, 4, 4)) == 0);
+}
+
 TEST_CASE("a pocket of fluid that bodies close in becomes immersed, and open fluid does not", "[immersed]") {
   IndexSpace index;
   for (int d = 0; d < 3; ++d) index.n[d] = index.global[d] = 9;
