@@ -380,7 +380,7 @@ TEST_CASE("a winding corridor is reached to its end, and what lies behind a wall
   BandViews band;
   band.key = Array<Key>("corpuscle::test::key", size);
   const Array<std::int8_t> reached("corpuscle::test::reached", size);
-  // In the plane k = 4, open at i = 0 and winding four times between j = 1 and 7: each turn takes a round of its own. A closed piece at its
+  // In the plane k = 4, open at i = 0 and winding between j = 1 and 7: each turn takes a round of its own. A closed piece at its
   // end.
   const auto kind = nodes.kind;
   for_owned(
