@@ -107,7 +107,7 @@ void check_flow(const std::string& name, std::vector<std::string> overrides, dou
   recorder.start();
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
-  FlowOutput output({folder.string(), [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
+  FlowOutput output({folder.string(), [] {}, [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
   output.after_step(true);
   for (int n = 0; n < 4; ++n) {
     simulation.step();
@@ -390,7 +390,7 @@ TEST_CASE("a sample of blood allocates nothing, and steps between samples launch
   std::filesystem::create_directories(folder);
   Timers timers;
   FlowSimulation simulation(Comm(), scene, timers);
-  FlowOutput output({folder.string(), [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
+  FlowOutput output({folder.string(), [] {}, [] {}, "", ""}, scene, simulation, timers, std::nullopt, std::chrono::steady_clock::now());
   std::vector<int> launches;
   Recorder recorder;
   for (int n = 1; n <= 12; ++n) {
