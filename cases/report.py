@@ -23,7 +23,7 @@ STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; color: #1b1b1b; }
 h1 { margin-bottom: 0; } h2 { border-bottom: 1px solid #ccc; margin-top: 2rem; } .sub { color: #555; }
 table { border-collapse: collapse; margin: .5rem 0; } td, th { padding: .15rem .7rem .15rem 0; text-align: left; vertical-align: top; }
-td.n { text-align: right; font-variant-numeric: tabular-nums; } tr.bad td { background: #fff0d8; }
+td.n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; } tr.bad td { background: #fff0d8; }
 .bar { background: #4a7dbd; height: .8rem; display: inline-block; } .ok { color: #176b2c; } .bad { color: #9a4a00; }
 img { max-width: 100%; } pre { background: #f6f6f6; padding: .7rem; overflow: auto; }
 """
@@ -84,25 +84,25 @@ def quantities(report):
     rows = [("", name(key), number(value), number(bars[key]) if key in bars else "<td></td>") for key, value in report.get("quantities", {}).items()]
     if not rows:
         return ""
-    note = "" if bars else "<p class=sub>No error bars: run with --estimate-error for some.</p>"
+    lack = ", ".join(report.get("error_bars_lack", []))
+    note = (f'<p class="bad">The bars lack what comes from: {escaped(lack)}</p>' if lack else "") if bars else (
+        "<p class=sub>No error bars: run with --estimate-error for some.</p>")
     return "<h2>Quantities at the end</h2>" + table(rows, ("quantity", "value", "error bar" if bars else "")) + note
 
 
 def errors_and_times(report):
     said = {warning["figure"]: warning["message"] for warning in report.get("warnings", []) if "figure" in warning}
-    keyed = [warning["message"] for warning in report.get("warnings", [])]
     rows = []
     for key, value in report.get("errors", {}).items():
         if value is None:
             continue
-        words = said.get(key) or next((message for message in keyed if message.startswith(key)), "")
-        rows.append(("bad" if words else "", name(key), number(value), name(words)))
+        rows.append(("bad" if key in said else "", name(key), number(value), name(said.get(key, ""))))
     parts = report.get("wall_s_by_part", {})
     most = max([*parts.values(), 1e-300])
     times = [("", name(part), number(seconds), f'<td><span class="bar" style="width:{100 * seconds / most:.0f}px"></span></td>')
              for part, seconds in sorted(parts.items(), key=lambda one: -one[1])]
-    warnings = "".join(f"<li>{escaped(message)}</li>" for message in keyed)
-    return ("<h2>Errors</h2>" + table(rows, ("error", "value", "")) + (f"<ul>{warnings}</ul>" if warnings else "<p class=ok>None is bad.</p>")
+    good = "" if said or "broke_down" in report else "<p class=ok>None is bad.</p>"
+    return ("<h2>Errors</h2>" + table(rows, ("error", "value", "")) + good
             + "<h2>Times</h2>" + table(times, ("part", "s", "")))
 
 
@@ -158,14 +158,14 @@ def program(report):
 def page_of(folder, report):
     title = report.get("title") or report["case"]
     case = folder / "resolved.toml"
-    text = case.read_text() if case.exists() else report.get("resolved_case", "")
+    text = case.read_text(errors="replace") if case.exists() else report.get("resolved_case", "")
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{escaped(title)}</title><style>{STYLE}</style></head><body>
 <h1>{escaped(title)}</h1><p class="sub">{escaped(report["case"])}</p>
 {outcome(report)}
+{blood(report)}
 {quantities(report)}
 {errors_and_times(report)}
-{blood(report)}
 {pictures(folder)}
 {program(report)}
 <h2>Case</h2><details><summary>every key with its value</summary><pre>{html.escape(text)}</pre></details>
@@ -180,14 +180,16 @@ def main():
     options = parser.parse_args()
     file = options.folder / "report.json"
     if not file.exists():
-        fail(f"{options.folder} holds no report.json: it is no folder of results, or the run has not ended")
-    try:
-        report = json.loads(file.read_text())
-    except ValueError as error:
-        fail(f"{file}: {error}")
+        fail(f"{options.folder} holds no report.json: it is no folder of results, or the run goes on or was killed. A run that was killed can be gone on "
+             "with from its checkpoint.h5 (corpuscle run CASE --restart DIR); plot.py draws what there is")
     page = options.out or options.folder / "report.html"
     try:
-        page.write_text(page_of(options.folder, report))
+        report = json.loads(file.read_text())
+        text = page_of(options.folder, report)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        fail(f"{file} is damaged, or of another program: {type(error).__name__}: {error}")
+    try:
+        page.write_text(text)
     except OSError as error:
         fail(f"{page} cannot be written: {error}")
     print(page)

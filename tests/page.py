@@ -82,6 +82,11 @@ def main():
         # What cannot be: no results, no folder that can be written in.
         assert "no report.json" in start(program, "report", work, code=2)
         assert "cannot be written" in start(program, "report", work / "out", "--out", work / "nowhere" / "page.html", code=2)
+        damaged = work / "damaged"
+        damaged.mkdir()
+        for text in ("[]", "{}", '{"case": "a", "errors": 3}', "{", "\0"):
+            (damaged / "report.json").write_text(text)
+            assert "is damaged" in start(program, "report", damaged, code=2)
         start(program, "report", work / "out", "--out", work / "page.html")
         assert (work / "page.html").read_text() == file.read_text()
         browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

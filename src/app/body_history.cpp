@@ -3,6 +3,7 @@
 #include "blood/guided_flow.hpp"
 #include "cells/cell_state.hpp"
 #include "common/extremes.hpp"
+#include "core/log.hpp"
 #include "membrane/shape_measures.hpp"
 
 #include <algorithm>
@@ -30,6 +31,12 @@ BodyHistory::BodyHistory(const std::string& folder, const Case& scene, FlowSimul
   if (!few_cells_ && scene.output.history_every_us > 0)
     series_ = std::make_unique<CellSeries>(folder, comm, simulation.cells(), cell_rows(*simulation.shared_cells()), restart_us);
 #endif
+  if (!few_cells_ && scene.output.history_every_us == 0 && !scene.output.cells)
+    warn(
+        "there are {} cells, more than output.cells_in_history = {}: nothing of each is kept; set output.history_every_us (cell_series.h5) "
+        "or "
+        "output.cells = true",
+        simulation.cells(), scene.output.cells_in_history);
   HistoryColumns columns;
   columns.cells = simulation.cells() > 0;
   columns.bodies = simulation.rigid_bodies() != nullptr;

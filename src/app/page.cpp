@@ -15,25 +15,29 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// In an installed tree beside the program; of a build where the source is.
 std::string find_script() {
   std::error_code ignored;
   const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  const bool built = folder == fs::path(CORPUSCLE_BUILD);
-  const fs::path script = ((built ? fs::path(CORPUSCLE_SOURCE) : folder / CORPUSCLE_SHARE) / "cases/report.py").lexically_normal();
-  if (!folder.empty() && fs::exists(script, ignored)) return script.string();
+  // Installed; in a build folder of a checkout, wherever that has been moved; in one elsewhere.
+  std::vector<fs::path> places{folder / CORPUSCLE_SHARE, folder.parent_path().parent_path()};
+  if (folder == fs::path(CORPUSCLE_BUILD)) places.emplace_back(CORPUSCLE_SOURCE);
+  for (auto& place : places) {
+    place = (place / "cases/report.py").lexically_normal();
+    if (!folder.empty() && fs::exists(place, ignored)) return place.string();
+  }
   throw InputError(
       fmt::format("report: {} is not there: it comes with the program (cmake --install), or lies in its source: python3 "
                   "cases/report.py DIR does the same",
-                  script.string()));
+                  places[0].string()));
 }
 
 }  // namespace
 
 void make_page(const std::string& folder, const std::string& out) {
   const std::string script = find_script();
-  std::vector<std::string> words{"python3", script, folder};
-  if (!out.empty()) words.insert(words.end(), {"--out", out});
+  std::vector<std::string> words{"python3", script};
+  if (!out.empty()) words.push_back("--out=" + out);
+  words.insert(words.end(), {"--", folder});
   std::vector<char*> argv;
   for (auto& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);

@@ -39,7 +39,7 @@ NodeSet::NodeSet(const std::string& path)
     : file{H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose},
       set{file.id < 0 ? -1 : H5Dopen2(file.id, "nodes", H5P_DEFAULT), H5Dclose} {
   if (file.id < 0) throw InputError(fmt::format("grid.file = \"{}\": cannot be opened as an HDF5 file", path));
-  if (set.id < 0) throw InputError(fmt::format("grid.file = \"{}\": has no data set \"nodes\"", path));
+  if (set.id < 0) throw InputError(fmt::format("grid.file = \"{}\": has no data set \"nodes\", [nk, nj, ni, 3], x, y, z in um", path));
   const Handle space{H5Dget_space(set.id), H5Sclose};
   hsize_t n[4] = {0, 0, 0, 0};
   if (H5Sget_simple_extent_ndims(space.id) != 4 || H5Sget_simple_extent_dims(space.id, n, nullptr) != 4 || n[3] != 3 || n[0] < 4 ||

@@ -170,8 +170,10 @@ OutputSettings read_output(Section& s, bool has_fluid, bool has_surfaces) {
                                    not_negative(), o.checkpoint_every_us);
   read_fields(s, o, has_fluid);
   o.cells = s.flag({"cells", "Write the surfaces of cells and bodies."}, has_surfaces);
-  o.cells_in_history = s.integer({"cells_in_history", "Up to how many cells each has lines in history.csv; of more, they go into HDF5."}, 0,
-                                 1000000, o.cells_in_history);
+  o.cells_in_history = s.integer(
+      {"cells_in_history",
+       "Up to how many cells each has lines in history.csv; figures of more go into cell_series.h5, with history_every_us above 0."},
+      0, 1000000, o.cells_in_history);
   s.finish();
   if (o.cells && !has_surfaces) s.fail("cells", "there are no [[cells]] or [[bodies]] to write");
   return o;

@@ -64,6 +64,7 @@ class CaseReader {
     check_output(scene, [&](const auto& s, const auto& k, const auto& p) { complain(s, k, p); });
     note_often_history(scene);
     note_no_samples(scene);
+    note_often_samples(scene);
     note_sharp_aggregation(scene);
     scene.resolved = echo_;
     return scene;
@@ -173,6 +174,12 @@ class CaseReader {
         fmt::format("output.history_every_us = {:g} is less than the shortest step, {:g} us: each step is a line, "
                     "as with 0",
                     every, shortest));
+  }
+
+  static void note_often_samples(Case& scene) {
+    if (!scene.blood || scene.blood->sample_every_us == 0 || scene.blood->sample_every_us >= scene.time.step_us) return;
+    scene.remarks.push_back(fmt::format("blood.sample_every_us = {:g} is less than time.step_us: samples are {:g} us apart",
+                                        scene.blood->sample_every_us, scene.blood->interval_us(scene.time.step_us)));
   }
 
   static void note_no_samples(Case& scene) {

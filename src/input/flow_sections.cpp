@@ -119,7 +119,8 @@ GridSettings read_grid(Section& s) {
   if (swept) read_centerline(s, grid);
   for (const char* key : {"centerline", "points_um", "arc_radius_um", "arc_angle_deg", "helix_radius_um", "helix_pitch_um", "helix_turns"})
     if (!swept) needs(false, "\"swept_tube\"", key);
-  if (needs(file, "\"file\"", "file")) grid.file = s.file({"file", "File of the grid's node coordinates (README, Grids)."}, true);
+  if (needs(file, "\"file\"", "file"))
+    grid.file = s.file({"file", "HDF5 file of the grid's nodes: a data set \"nodes\" [nk, nj, ni, 3] of doubles, x, y, z in um."}, true);
   s.finish();
   check_grid(s, grid);
   return grid;
