@@ -194,7 +194,7 @@ TEST_CASE("the progress line") {
   REQUIRE(progress_text(999.99, 1000, 2, 3700) == "99.9 %  999.99 of 1000 us  2 steps/s  1 h 1 min left");
   REQUIRE_THAT(progress_text(0, 1000, 0, -1), !Contains("left"));
   // On a narrow terminal the rate goes before the error does.
-  REQUIRE(progress_text(123, 1000, 45.61, 80, "energy_balance 0.00041 of 0.05", 70) ==
+  REQUIRE(progress_text(123, 1000, 45.61, 80, "energy_balance 0.00041 of 0.05", 75) ==
           "12.3 %  123 of 1000 us  1 min 20 s left  energy_balance 0.00041 of 0.05");
   REQUIRE(progress_text(123, 1000, 45.61, 80, "energy_balance 0.00041 of 0.05", 30) == "12.3 %  123 of 1000 us  1 min ");
   REQUIRE_THAT(progress_text(10, 1000, 2, 80, "slip 0.1 of 0.15"), Contains("1 min 20 s left  slip 0.1 of 0.15"));
