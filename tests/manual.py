@@ -17,6 +17,12 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "cases"))
+import python_with  # noqa: E402
+
+python_with.need("h5py")
+import h5py  # noqa: E402
+
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 # Scenes beside those of the manual, for the names that they alone write.
 MORE = {"obstacle": ["time.end_us=20"], "two_cells": ["time.end_us=20"], "couette": ["time.end_us=40"], "tube_flow": ["time.end_us=8"], "stretch": ["stretching.steps=2"],
@@ -50,8 +56,6 @@ def play(page, folder, environment):
 
 
 def dataset_names(path):
-    import h5py
-
     names = set()
     with h5py.File(path) as file:
         file.visit(lambda name: names.add(name.split("/")[-1]))
