@@ -92,7 +92,8 @@ inline double least_thickness(const Lattice& of_block, int d, int end) {
       "corpuscle::contact::least_thickness", Policy(0, across * lattice.index.n[f]),
       KOKKOS_LAMBDA(int n, double& sum) {
         double xi[3];
-        xi[e] = n % across, xi[f] = n / across;
+        const int row = n / across;
+        xi[e] = n % across, xi[f] = row;
         Vec3 at[2], tangent[3];
         for (int far = 0; far < 2; ++far) {
           LatticePoint q;

@@ -39,6 +39,7 @@ void make_page(const std::string& folder, const std::string& out) {
   if (!out.empty()) words.push_back("--out=" + out);
   words.insert(words.end(), {"--", folder});
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (auto& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   execvp(argv[0], argv.data());

@@ -202,6 +202,7 @@ const ImmersedReport& ImmersedFlow::report() {
 std::vector<long> ImmersedFlow::traction_fits() const {
   const auto own = boundary_->traction_fallbacks();
   std::vector<long> all;
+  all.reserve(own.size());
   for (const int count : own) all.push_back(fluid_.grid().comm().sum(static_cast<long>(count)));
   return all;
 }
