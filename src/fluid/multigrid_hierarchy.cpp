@@ -56,7 +56,8 @@ bool MultigridHierarchy::add_coarser(int most_gathered) {
   double coarse_cells = 1;
   for (int d = 0; d < 3; ++d) {
     if (strength[d] >= strong * most) factor[d] = 2;
-    coarse_cells *= (index.global[d] + factor[d] - 1) / factor[d];
+    const int cells = (index.global[d] + factor[d] - 1) / factor[d];
+    coarse_cells *= cells;
   }
   const bool gathered = comm.size() > 1 && coarse_cells <= most_gathered;
   for (int d = 0; d < 3; ++d) {

@@ -82,6 +82,7 @@ class Section {
   template <class E>
   E choice(const Key& key, const std::vector<std::pair<std::string, E>>& words, std::optional<E> fallback = {}) {
     std::vector<std::string> names;
+    names.reserve(words.size());
     for (const auto& [name, value] : words) names.push_back(name);
     std::size_t chosen = words.size();
     for (std::size_t i = 0; fallback && i < words.size(); ++i)
