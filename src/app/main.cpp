@@ -193,7 +193,7 @@ bool can_stay_alone(Command& command) {
 }
 #endif
 
-/// Needs neither MPI nor a device. Under a launcher the first process does it. @return how it has failed
+/// Needs neither MPI nor a device, and does not return where it works. Under a launcher the first process does it.
 int page_of_results(const Command& command) {
   for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID", "SLURM_PROCID"})
     if (const char* rank = std::getenv(name); rank && std::string(rank) != "0") return exit_done;

@@ -117,9 +117,7 @@ void Progress::update(long step, double time_us, const std::function<std::string
   const auto text = progress_text(time_us, end_us_, rate_, rate_ > 0 ? (steps_ - step) / rate_ : -1.0, worst(),
                                   terminal_ ? columns_of_terminal() - 1 : 1000);
   if (terminal_) {
-    // The rest of the line is erased; one that is too long for the terminal would leave its first half behind.
-    std::fputs(fmt::format("\r{}\033[K", text.substr(0, columns_of_terminal() - 1)).c_str(),
-               stdout);  // a terminal that is gone stops no run
+    std::fputs(fmt::format("\r{}\033[K", text).c_str(), stdout);  // and erased to its end; a terminal that is gone stops no run
     std::fflush(stdout);
     log.line_open = true;
   } else {

@@ -101,41 +101,27 @@ std::vector<SectionRecord> list_keys() {
 }
 
 std::string unit_of(const std::string& key) {
-  static const std::vector<std::string> units{"pg_per_um2_per_us",
-                                              "um2_per_us",
-                                              "pg_per_um3",
-                                              "Pa_per_um",
-                                              "fJ_per_um2",
-                                              "N_s_per_m",
-                                              "rad_per_s",
-                                              "mm_per_s",
-                                              "uN_per_m",
-                                              "deg",
-                                              "um",
-                                              "us",
-                                              "pg",
-                                              "nN",
-                                              "pN",
-                                              "Pa",
-                                              "J"};
-  const auto ends = [&](const std::string& unit) {
-    const std::string end = "_" + unit;
-    return key.size() > end.size() && key.compare(key.size() - end.size(), end.size(), end) == 0;
-  };
-  const auto found = std::find_if(units.begin(), units.end(), ends);
-  if (found == units.end()) return "";
-  // What comes after the first "per" is below the line.
-  std::string unit = *found;
-  const auto put = [&](const std::string& from, const std::string& to, bool once) {
-    for (auto at = unit.find(from); at != std::string::npos; at = once ? std::string::npos : unit.find(from))
-      unit.replace(at, from.size(), to);
-  };
-  put("_per_", "/", true);
-  put("_per_", " ", false);
-  put("_", " ", false);
-  if (const auto line = unit.find('/'); line != std::string::npos && unit.find(' ', line) != std::string::npos)
-    unit = unit.substr(0, line + 1) + "(" + unit.substr(line + 1) + ")";
-  return unit;
+  // Longer ends before those that they end in.
+  static const std::pair<std::string, std::string> units[] = {{"_pg_per_um2_per_us", "pg/(um2 us)"},
+                                                              {"_um2_per_us", "um2/us"},
+                                                              {"_pg_per_um3", "pg/um3"},
+                                                              {"_Pa_per_um", "Pa/um"},
+                                                              {"_fJ_per_um2", "fJ/um2"},
+                                                              {"_N_s_per_m", "N s/m"},
+                                                              {"_rad_per_s", "rad/s"},
+                                                              {"_mm_per_s", "mm/s"},
+                                                              {"_uN_per_m", "uN/m"},
+                                                              {"_deg", "deg"},
+                                                              {"_um", "um"},
+                                                              {"_us", "us"},
+                                                              {"_pg", "pg"},
+                                                              {"_nN", "nN"},
+                                                              {"_pN", "pN"},
+                                                              {"_Pa", "Pa"},
+                                                              {"_J", "J"}};
+  for (const auto& [end, unit] : units)
+    if (key.size() > end.size() && key.compare(key.size() - end.size(), end.size(), end) == 0) return unit;
+  return "";
 }
 
 namespace {

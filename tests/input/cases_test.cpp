@@ -33,9 +33,9 @@ void require_same(const Case& a, const Case& b) {
   REQUIRE(a.output == b.output);
 }
 
-Case read_echo(const Case& original) {
+Case read_back(const std::string& text) {
   const auto path = fs::temp_directory_path() / "corpuscle_test_echo.toml";
-  std::ofstream(path) << original.resolved;
+  std::ofstream(path) << text;
   auto again = read_case(path.string());
   fs::remove(path);
   return again;
@@ -50,11 +50,10 @@ TEST_CASE("every case file reads, and its echo reads back to the same case") {
     ++found;
     INFO(entry.path());
     const auto scene = read_case(entry.path().string());
-    const auto again = read_echo(scene);
+    const auto again = read_back(scene.resolved);
     require_same(scene, again);
     REQUIRE(again.resolved == scene.resolved);
-    std::ofstream(fs::temp_directory_path() / "corpuscle_test_resolved.toml") << resolved_text(scene);
-    const auto resolved = read_case((fs::temp_directory_path() / "corpuscle_test_resolved.toml").string());
+    const auto resolved = read_back(resolved_text(scene));
     require_same(scene, resolved);
     CHECK(resolved.remarks == scene.remarks);  // nothing that it says besides is warned of
   }
@@ -71,7 +70,7 @@ TEST_CASE("the echo keeps overrides, awkward texts and every kind of value") {
   REQUIRE(scene.coupling->robin_coefficient == 4.5);
   REQUIRE_FALSE(scene.output.velocity);
   REQUIRE(scene.output.pressure);
-  require_same(scene, read_echo(scene));
+  require_same(scene, read_back(scene.resolved));
 }
 
 TEST_CASE("the stretching case names its experiment by a path that holds from anywhere") {
@@ -164,7 +163,7 @@ TEST_CASE("cells have what their type says, and the echo keeps types") {
   REQUIRE(stiff.axis == Triple{0, 1, 0});
   REQUIRE(scene.cells[3].center_um == Triple{0, 0, -9});
   REQUIRE(scene.cells[3].vertices == 400);
-  require_same(scene, read_echo(scene));
+  require_same(scene, read_back(scene.resolved));
 }
 
 TEST_CASE("keys without effect on membranes that are forces are remarked upon") {
@@ -173,7 +172,7 @@ TEST_CASE("keys without effect on membranes that are forces are remarked upon") 
   REQUIRE(scene.remarks.size() == 2);
   REQUIRE(scene.remarks[0] == "cells.0.mass_pg = 100 has no effect with coupling.scheme = \"force\": membranes have no mass of their own");
   REQUIRE(scene.remarks[1].rfind("cells.0.interior = \"empty\" has no effect", 0) == 0);
-  require_same(scene, read_echo(scene));
+  require_same(scene, read_back(scene.resolved));
   const auto typed = typed_case({"coupling.scheme=force", "cells.0.membrane_viscosity_N_s_per_m=0", "cell_types.1.mass_pg=30"});
   REQUIRE(typed.remarks.size() == 3);
   REQUIRE(typed.remarks[2].find("cells and no [contact]") != std::string::npos);
@@ -196,7 +195,7 @@ TEST_CASE("membranes with viscosity that are forces begin with short steps, unle
   CHECK(whole.remarks[0].find("leave the key out") != std::string::npos);
   const auto scene = read("two_cells.toml", {viscous});
   CHECK(scene.remarks.empty());
-  require_same(scene, read_echo(scene));
+  require_same(scene, read_back(scene.resolved));
   CHECK(read("straight_tube.toml", {"time.first_step_us=0", "cells.0.membrane_viscosity_N_s_per_m=5e-7"}).remarks.empty());
 }
 
